@@ -1,0 +1,42 @@
+"""Progress of long work, on stderr: a bar on a terminal, a line now and then in a log."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+Item = TypeVar("Item")
+
+LOG_INTERVAL_S = 5.0
+"""Seconds between two lines where stderr is a file, so that a log stays readable."""
+
+
+def track(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:
+    """Yield ``items`` and report on stderr how far it is.
+
+    Args:
+        items: what to go through.
+        label: what is being done.
+        total: number of items, where ``len(items)`` does not tell.
+    """
+    if total is None and hasattr(items, "__len__"):
+        total = len(items)
+    if sys.stderr.isatty():
+        from rich.console import Console
+        from rich.progress import track as rich_track
+
+        console = Console(stderr=True)
+        yield from rich_track(items, description=label, total=total, console=console)
+        return
+    of_total = "" if total is None else f"/{total}"
+    last = time.monotonic()
+    done = 0
+    for done, item in enumerate(items, start=1):
+        yield item
+        now = time.monotonic()
+        if now - last >= LOG_INTERVAL_S:
+            print(f"{label}: {done}{of_total}", file=sys.stderr, flush=True)
+            last = now
+    print(f"{label}: done ({done})", file=sys.stderr, flush=True)

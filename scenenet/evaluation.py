@@ -1,0 +1,98 @@
+"""Scores of a model on crops: voxels and towers (thesis 5.2.4; docs/design.md, Definitions)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from scenenet.detection import DetectionSettings, detect_towers
+from scenenet.metrics import Confusion, ThresholdCurve, TowerMatch, confusion, match_towers
+from scenenet.modelfile import ModelCard, read_model
+from scenenet.models import VoxelModel
+from scenenet.progress import track
+from scenenet.training import probabilities
+from scenenet.tuning import curve_columns
+from scenenet.voxel_store import Dataset, load
+
+
+def evaluate(
+    model: str | Path,
+    voxel_manifests: Sequence[str | Path],
+    split: str | Path,
+    detection: DetectionSettings,
+    part: str = "test",
+) -> dict[str, Any]:
+    """Scores of a tuned model on one part of the split (see ``score``)."""
+    trained, card = read_model(model)
+    parts = pd.read_csv(split, dtype={"crop": str})
+    dataset = load(list(voxel_manifests), set(parts.loc[parts["part"] == part, "crop"]))
+    return {"part": part} | score(trained, card, dataset, detection)
+
+
+def score(
+    model: VoxelModel, card: ModelCard, dataset: Dataset, detection: DetectionSettings
+) -> dict[str, Any]:
+    """Voxel and tower scores at the model's tau over all samples.
+
+    Voxel scores come from the counts of all samples together, and all voxels of the grids count,
+    empty ones included. ``voxel_occupied`` counts the occupied voxels alone, ``voxel_trivial`` is
+    the model that never says tower, and ``alive`` says whether the model found any tower voxel.
+
+    Returns:
+        model, seed, alive, voxel, voxel_trivial, voxel_occupied, towers, per_sample, pr_curve and
+        average_precision, all of plain numbers.
+    """
+    tau = card.threshold()
+    every, occupied = Confusion(), Confusion()
+    curve: ThresholdCurve | None = None
+    towers = TowerMatch(np.empty(0), 0, 0)
+    per_sample = []
+    pairs = list(zip(dataset.samples, dataset.crops, strict=True))
+    for sample, crop in track(pairs, f"{card.name}: crops scored"):
+        probability, truth = probabilities(model, sample, card.measurement)
+        counts = confusion(probability, truth, tau)
+        every += counts
+        occupied += confusion(probability[sample.index], truth[sample.index], tau)
+        of_sample = ThresholdCurve.of(probability, truth)
+        curve = of_sample if curve is None else curve + of_sample
+        # A tower is made of points: a detected voxel that is empty has nothing to show a person.
+        detected = sample.index[probability[sample.index] >= tau]
+        found = detect_towers(
+            sample.grid.centres(detected),
+            probability[detected],
+            sample.grid.centres(sample.index),
+            sample.grid.voxel_size,
+            detection,
+        )
+        match = match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)
+        towers += match
+        per_sample.append(
+            {
+                "id": sample.id,
+                **counts.scores(),
+                "tp": counts.tp,
+                "fp": counts.fp,
+                "fn": counts.fn,
+                "tn": counts.tn,
+                "towers_true": match.n_true,
+                "towers_predicted": match.n_predicted,
+                "position_error_m": float(match.errors.min()) if len(match.errors) else None,
+            }
+        )
+    shared = {"tau": tau, "n_samples": len(pairs)}
+    return {
+        "model": card.name,
+        "seed": card.provenance.get("seed"),
+        "alive": every.tp > 0,
+        "voxel": every.scores() | shared,
+        "voxel_trivial": every.without_predictions().scores() | shared,
+        "voxel_occupied": occupied.scores() | shared,
+        "towers": towers.scores(),
+        "per_sample": per_sample,
+        "pr_curve": {} if curve is None else curve_columns(curve),
+        "average_precision": 0.0 if curve is None else curve.average_precision(),
+    }

@@ -1,0 +1,14 @@
+"""Group-equivariant non-expansive operators: the kernels that hold the knowledge (thesis 4.4)."""
+
+from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, zero_sum
+from scenenet.geneo.registry import kernel_named, kernel_names, register
+
+__all__ = [
+    "GeneoKernel",
+    "Lattice",
+    "ShapeParameter",
+    "kernel_named",
+    "kernel_names",
+    "register",
+    "zero_sum",
+]

@@ -1,0 +1,110 @@
+"""What a GENEO kernel is: a function of space with shape parameters, sampled on a voxel lattice."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import torch
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class ShapeParameter:
+    """One trainable number of a kernel.
+
+    Attributes:
+        name: its symbol in the thesis, spelt out (``r``, ``sigma``, ``omega``).
+        low, high: the range it is drawn from at the start of training, in units of ``unit``.
+        unit: ``voxel``, ``voxel^2`` or ``1``.
+        meaning: what it says about a tower, as part of a sentence.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """The places at which a kernel is sampled, in voxels.
+
+    The kernel's centre lies on element ``(k - 1) // 2`` of each axis, the element that the
+    convolution puts on the voxel it answers for (see ``scenenet.convolution``). An even size has
+    one more element on the high side; so no size shifts the answer by half a voxel.
+
+    Attributes:
+        size: (kz, ky, kx).
+        z: (kz, 1, 1) height above the centre.
+        planar_squared: (1, ky, kx) squared distance from the vertical axis, ||pi_-3(x - c)||^2.
+    """
+
+    size: tuple[int, int, int]
+    z: Tensor
+    planar_squared: Tensor
+
+    @classmethod
+    def of_size(cls, size: tuple[int, int, int], dtype: torch.dtype = torch.float32) -> Lattice:
+        """The lattice of a kernel of ``size`` (kz, ky, kx), each at least 1."""
+        if len(size) != 3 or min(size) < 1:
+            raise ValueError(f"kernel size must be three positive integers, not {size}")
+        z, y, x = (torch.arange(k, dtype=dtype) - (k - 1) // 2 for k in size)
+        planar = y[:, None] ** 2 + x[None, :] ** 2
+        return cls(tuple(size), z[:, None, None], planar[None])
+
+    @property
+    def top(self) -> float:
+        """Height of the highest element above the centre."""
+        return float(self.z[-1, 0, 0])
+
+
+class GeneoKernel(ABC):
+    """A family of kernels g: R^3 -> R with shape parameters (thesis 4.4).
+
+    To add one, put a file with a subclass into ``scenenet/geneo/kernels`` and decorate it with
+    ``scenenet.geneo.register``; nothing else has to know of it.
+    """
+
+    name: ClassVar[str]
+    parameters: ClassVar[tuple[ShapeParameter, ...]]
+
+    @abstractmethod
+    def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
+        """The kernel's values on the lattice.
+
+        Args:
+            lattice: where to sample.
+            shape: a 0-dimensional tensor for each of ``parameters``; the answer is differentiable
+                in every one.
+
+        Returns:
+            (kz, ky, kx), axes z (up), y, x.
+        """
+
+
+def zero_sum(kernel: Tensor) -> Tensor:
+    """The kernel with its mean taken off each horizontal slice (thesis 4.4.1: "normalized").
+
+    A kernel that sums to zero answers nothing to uniform surroundings and punishes points where
+    the pattern has none. Each slice is balanced on its own, so a scene that is uniform in the plane
+    but changes with height, as bare ground does, is answered with zero as well.
+
+    Args:
+        kernel: (kz, ky, kx).
+
+    Returns:
+        (kz, ky, kx), each [z] summing to zero.
+    """
+    return kernel - kernel.mean(dim=(1, 2), keepdim=True)
+
+
+def gaussian_shell(squared_distance: Tensor, squared_radius: Tensor, sigma: Tensor) -> Tensor:
+    """exp(-(d^2 - r^2)^2 / (2 sigma^2)): one on the shell of radius r, falling off on both sides.
+
+    The thesis compares squared lengths, so sigma is a squared length as well.
+    """
+    return torch.exp(-((squared_distance - squared_radius) ** 2) / (2 * sigma**2))

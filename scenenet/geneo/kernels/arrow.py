@@ -1,0 +1,43 @@
+"""A tower's body with a cone on top for the lines that meet there (thesis 4.4.2, Figure 4.3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import torch
+from torch import Tensor
+
+from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, gaussian_shell, zero_sum
+from scenenet.geneo.registry import register
+
+CONE_SHARE = 1 / 3
+"""Share of the kernel's height that the cone takes. The height h at which it begins follows from
+the kernel's size and is not trained (thesis Figure 5.5), which leaves eleven trained numbers."""
+
+
+@register
+class Arrow(GeneoKernel):
+    """A cylinder of radius r below height h and, from h on, a cone of radius r_c sqrt(sin theta).
+
+    g(x) = exp(-(d^2 - r^2)^2 / (2 sigma^2))                 where z < h
+           exp(-(d^2 - r_c^2 sin theta)^2 / (2 sigma^2))     where z >= h
+    theta = beta pi / (2 + z - h),  d = ||pi_-3(x - c)||,  summing to zero.
+    """
+
+    name = "arrow"
+    parameters = (
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body"),
+        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around both radii"),
+        ShapeParameter("r_c", 0.5, 3.0, "voxel", "reach of the tower's head, where the lines meet"),
+        ShapeParameter("beta", 0.1, 0.9, "1", "inclination of the head"),
+    )
+
+    def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
+        head_slices = max(1, round(CONE_SHARE * lattice.size[0]))
+        above_h = lattice.z - (lattice.top - head_slices + 1)
+        theta = shape["beta"] * math.pi / (2 + above_h.clamp(min=0))
+        radius_squared = torch.where(
+            above_h < 0, shape["r"] ** 2, shape["r_c"] ** 2 * torch.sin(theta)
+        )
+        return zero_sum(gaussian_shell(lattice.planar_squared, radius_squared, shape["sigma"]))

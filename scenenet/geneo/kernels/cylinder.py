@@ -1,0 +1,25 @@
+"""The body of a tower: long, vertical and narrow (thesis 4.4.1, Figure 4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from torch import Tensor
+
+from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, gaussian_shell, zero_sum
+from scenenet.geneo.registry import register
+
+
+@register
+class Cylinder(GeneoKernel):
+    """g(x) = exp(-(||pi_-3(x - c)||^2 - r^2)^2 / (2 sigma^2)), summing to zero."""
+
+    name = "cylinder"
+    parameters = (
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body"),
+        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius"),
+    )
+
+    def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
+        shell = gaussian_shell(lattice.planar_squared, shape["r"] ** 2, shape["sigma"])
+        return zero_sum(shell.expand(lattice.size))

@@ -1,0 +1,60 @@
+"""The settings of training and tuning (thesis 5.2.1), apart from the code that follows them.
+
+They stand by themselves because reading the configuration must not load torch.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from scenenet.settings import Settings
+
+Positive = Annotated[int, Field(ge=1)]
+KernelSize = tuple[Positive, Positive, Positive]
+THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
+Measurement = Literal["presence", "density"]
+
+
+class LossSettings(Settings):
+    """The GENEO loss (thesis 4.5)."""
+
+    alpha: float = Field(5.0, ge=0, description="emphasis of the weighting scheme f_w")
+    epsilon: float = Field(0.1, gt=0, description="smallest weight before normalisation")
+    rho_shape: float = Field(5.0, ge=0, description="rho_t, penalty on negative shape parameters")
+    rho_mixing: float = Field(5.0, ge=0, description="rho_l, penalty on negative mixing weights")
+
+
+class TrainingSettings(Settings):
+    """How a model is trained."""
+
+    epochs: int = Field(50, ge=1, description="passes over the training set")
+    batch_size: int = Field(8, ge=1, description="crops a step")
+    optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
+    learning_rate: float = Field(0.001, gt=0, description="step size of the optimiser")
+    loss: LossSettings = LossSettings()
+
+
+class ModelSettings(Settings):
+    """One architecture and the protocol it is trained by."""
+
+    name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$", description="name in results and tables")
+    kind: Literal["scenenet", "cnn"] = Field(description="architecture")
+    geneos: tuple[str, ...] = Field(
+        THESIS_GENEOS, min_length=1, description="kernels of a SCENE-Net; a name may be repeated"
+    )
+    n_kernels: int = Field(3, ge=1, description="kernels of a CNN")
+    kernel_size: KernelSize = Field((9, 9, 9), description="(kz, ky, kx) in voxels")
+    measurement: Measurement = Field("presence", description="phi (thesis 4.2.2, 5.3.2)")
+    training: TrainingSettings = TrainingSettings()
+
+
+class TuningSettings(Settings):
+    """What is chosen on the validation part, by F0.5 (thesis 5.2.7)."""
+
+    kernel_sizes: tuple[KernelSize, ...] = Field(
+        (),
+        description="further sizes (kz, ky, kx) that the kernels of a SCENE-Net are sampled at; "
+        "the size it was trained with is always tried, and a CNN has no other",
+    )

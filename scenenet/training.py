@@ -1,0 +1,263 @@
+"""The training loop (thesis 5.2.1)."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import torch
+
+from scenenet.batches import batch
+from scenenet.errors import InputError
+from scenenet.files import atomic, digest
+from scenenet.losses import VoxelWeights, fidelity, negativity
+from scenenet.metrics import ThresholdCurve
+from scenenet.modelfile import ModelCard, write_model
+from scenenet.models import SceneNet, VoxelModel, new_model
+from scenenet.progress import track
+from scenenet.protocol import Measurement, ModelSettings, TrainingSettings
+from scenenet.voxel_store import Dataset, load
+from scenenet.voxels import VoxelSample, VoxelSettings
+
+OPTIMISERS = {"rmsprop": torch.optim.RMSprop, "adam": torch.optim.Adam, "sgd": torch.optim.SGD}
+
+
+def train(
+    voxel_manifests: Sequence[str | Path],
+    split: str | Path,
+    model: ModelSettings,
+    seed: int,
+    out_model: str | Path,
+    out_history: str | Path,
+    checkpoint: str | Path,
+    grid: VoxelSettings,
+    provenance: Mapping[str, Any],
+) -> None:
+    """Train one model with one seed on the training part and write it with its history.
+
+    Args:
+        voxel_manifests: of the voxel stores, all of the same grid.
+        split: CSV file of ``scenenet.split``.
+        out_history: CSV file, a row an epoch: epoch, loss, fidelity, penalty, validation_loss,
+            validation_f05, seconds, and for SCENE-Net a column per parameter.
+        checkpoint: file that an interrupted training goes on from; gone when it has ended.
+        provenance: kept in the model file beside seed and data fingerprint.
+    """
+    parts = pd.read_csv(split, dtype={"crop": str}).groupby("part")["crop"].agg(set)
+    training = load(list(voxel_manifests), parts["train"])
+    validation = load(list(voxel_manifests), parts["validation"])
+    trained, history = fit(
+        training.samples, validation.samples, model, seed, checkpoint=Path(checkpoint)
+    )
+    card = card_of(training, model, grid, seed, provenance)
+    with atomic(out_history) as partial:
+        history.to_csv(partial, index=False)
+    write_model(out_model, trained, card)
+    Path(checkpoint).unlink(missing_ok=True)
+
+
+def card_of(
+    training: Dataset,
+    model: ModelSettings,
+    grid: VoxelSettings,
+    seed: int,
+    provenance: Mapping[str, Any],
+) -> ModelCard:
+    """The card of a model trained on ``training``."""
+    return ModelCard(
+        name=model.name,
+        codes=training.codes,
+        measurement=model.measurement,
+        fit=grid.fit,
+        resolution=grid.resolution,
+        voxel_size=float(np.median([s.grid.voxel_size for s in training.samples])),
+        provenance={
+            "seed": seed,
+            "data": digest(sorted(training.content)),
+            "training_crops": len(training.samples),
+            "training": model.training.model_dump(),
+            "trained_kernel_size": list(model.kernel_size),
+            **provenance,
+        },
+    )
+
+
+def fit(
+    training: Sequence[VoxelSample],
+    validation: Sequence[VoxelSample],
+    settings: ModelSettings,
+    seed: int,
+    *,
+    checkpoint: Path | None = None,
+) -> tuple[VoxelModel, pd.DataFrame]:
+    """Train a new model; the same arguments give the same numbers on the same machine.
+
+    Args:
+        checkpoint: file written after every epoch. Where it exists and is of the same settings,
+            seed and samples, training goes on from it.
+
+    Returns:
+        the model after the last epoch, and its history (see ``train``).
+
+    Raises:
+        InputError: there is nothing to train on.
+    """
+    if not any(sample.tower.any() for sample in training):
+        raise InputError(
+            f"no tower voxel in the {len(training)} training crops",
+            remedy="Add labelled crops, and check that their class scheme is the right one",
+        )
+    model = new_model(settings, seed)
+    protocol = settings.training
+    optimiser = OPTIMISERS[protocol.optimiser](model.parameters(), lr=protocol.learning_rate)
+    n_tower = sum(int(sample.tower.sum()) for sample in training)
+    n_voxels = sum(sample.grid.n_voxels for sample in training)
+    weights = VoxelWeights.of_counts(n_tower, n_voxels, protocol.loss.alpha, protocol.loss.epsilon)
+    identity = _identity(training, validation, settings, seed)
+    history = _resume(checkpoint, identity, model, optimiser)
+    label = f"{settings.name} seed {seed}: epochs"
+    for epoch in track(range(len(history) + 1, protocol.epochs + 1), label):
+        begin = time.perf_counter()
+        row = _epoch(model, optimiser, training, settings, weights, [seed, epoch])
+        row["seconds"] = time.perf_counter() - begin
+        row |= _validate(model, validation, settings.measurement, weights)
+        if isinstance(model, SceneNet):
+            row |= model.shape_parameters()
+        history.append({"epoch": epoch} | row)
+        if checkpoint is not None:
+            _save(checkpoint, identity, model, optimiser, history)
+    return model, pd.DataFrame(history)
+
+
+def threshold_curve(
+    model: VoxelModel, samples: Sequence[VoxelSample], measurement: Measurement
+) -> ThresholdCurve:
+    """Scores at every tau over all voxels of ``samples``, empty ones included."""
+    n = len(ThresholdCurve.of(np.zeros(0), np.zeros(0, bool)).true)
+    total = ThresholdCurve(np.zeros(n, np.int64), np.zeros(n, np.int64))
+    for sample in samples:
+        total += ThresholdCurve.of(*probabilities(model, sample, measurement))
+    return total
+
+
+def probabilities(
+    model: VoxelModel, sample: VoxelSample, measurement: Measurement
+) -> tuple[np.ndarray, np.ndarray]:
+    """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid."""
+    occupancy, towers = batch([sample], measurement)
+    with torch.no_grad():
+        probability = model(occupancy).numpy().reshape(-1)
+    truth = np.zeros(len(probability), bool)
+    truth[towers] = True
+    return probability, truth
+
+
+def _epoch(
+    model: VoxelModel,
+    optimiser: torch.optim.Optimizer,
+    training: Sequence[VoxelSample],
+    settings: ModelSettings,
+    weights: VoxelWeights,
+    entropy: list[int],
+) -> dict[str, float]:
+    """One pass over the shuffled training set; mean loss over its crops."""
+    protocol: TrainingSettings = settings.training
+    # The order follows from seed and epoch alone, so a resumed training draws the same batches.
+    order = np.random.default_rng(entropy).permutation(len(training))
+    sums = {"loss": 0.0, "fidelity": 0.0, "penalty": 0.0}
+    for start in range(0, len(order), protocol.batch_size):
+        chosen = [training[i] for i in order[start : start + protocol.batch_size]]
+        occupancy, towers = batch(chosen, settings.measurement)
+        optimiser.zero_grad()
+        error = fidelity(model(occupancy), torch.from_numpy(towers), weights)
+        penalty = negativity(model, protocol.loss)
+        loss = error + penalty
+        loss.backward()
+        optimiser.step()
+        for name, value in zip(sums, (loss, error, penalty), strict=True):
+            sums[name] += value.item() * len(chosen)
+    return {name: value / len(order) for name, value in sums.items()}
+
+
+def _validate(
+    model: VoxelModel,
+    validation: Sequence[VoxelSample],
+    measurement: Measurement,
+    weights: VoxelWeights,
+) -> dict[str, float]:
+    """Loss and best F0.5 on the validation part; NaN where there is none."""
+    if not validation:
+        return {"validation_loss": float("nan"), "validation_f05": float("nan")}
+    losses, sizes = [], []
+    with torch.no_grad():
+        for sample in validation:
+            occupancy, towers = batch([sample], measurement)
+            losses.append(fidelity(model(occupancy), torch.from_numpy(towers), weights).item())
+            sizes.append(sample.grid.n_voxels)
+    _, best = threshold_curve(model, validation, measurement).best()
+    return {
+        "validation_loss": float(np.average(losses, weights=sizes)),
+        "validation_f05": best.f05,
+    }
+
+
+def _identity(
+    training: Sequence[VoxelSample],
+    validation: Sequence[VoxelSample],
+    settings: ModelSettings,
+    seed: int,
+) -> str:
+    """Digest of all that a checkpoint depends on."""
+
+    def print_of(sample: VoxelSample) -> list[Any]:
+        return [sample.id, len(sample.index), int(sample.index.sum()), int(sample.tower.sum())]
+
+    samples = [[print_of(s) for s in part] for part in (training, validation)]
+    return digest([settings.model_dump(), seed, samples])
+
+
+def _save(
+    path: Path,
+    identity: str,
+    model: VoxelModel,
+    optimiser: torch.optim.Optimizer,
+    history: list[dict[str, float]],
+) -> None:
+    from safetensors.torch import save_file
+
+    tensors = {f"model/{name}": value for name, value in model.state_dict().items()}
+    for number, state in optimiser.state_dict()["state"].items():
+        tensors |= {f"optimiser/{number}/{key}": value for key, value in state.items()}
+    metadata = {"identity": identity, "history": json.dumps(history)}
+    with atomic(path) as partial:
+        save_file({k: v.clone() for k, v in tensors.items()}, partial, metadata=metadata)
+
+
+def _resume(
+    path: Path | None, identity: str, model: VoxelModel, optimiser: torch.optim.Optimizer
+) -> list[dict[str, float]]:
+    """Take model, optimiser and history from a checkpoint; an empty history where none fits."""
+    if path is None or not path.is_file():
+        return []
+    from safetensors import safe_open
+
+    with safe_open(path, framework="pt") as stream:
+        metadata = stream.metadata()
+        if metadata["identity"] != identity:
+            return []
+        tensors = {name: stream.get_tensor(name) for name in list(stream.keys())}
+    model.load_state_dict(
+        {k.removeprefix("model/"): v for k, v in tensors.items() if k.startswith("model/")}
+    )
+    state: dict[int, dict[str, Any]] = {}
+    for name, value in tensors.items():
+        if name.startswith("optimiser/"):
+            _, number, key = name.split("/")
+            state.setdefault(int(number), {})[key] = value
+    optimiser.load_state_dict(optimiser.state_dict() | {"state": state})
+    return json.loads(metadata["history"])

@@ -1,0 +1,101 @@
+"""What is chosen on the validation part: tau, the kernel size, the seed (thesis 5.2.4.1, 5.2.7)."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from scenenet.files import atomic, read_json, write_json
+from scenenet.metrics import ThresholdCurve
+from scenenet.modelfile import ModelCard, read_model, write_model
+from scenenet.models import SceneNet, VoxelModel
+from scenenet.protocol import TuningSettings
+from scenenet.training import threshold_curve
+from scenenet.voxel_store import load
+from scenenet.voxels import VoxelSample
+
+
+def tune(
+    model: str | Path,
+    voxel_manifests: Sequence[str | Path],
+    split: str | Path,
+    settings: TuningSettings,
+    out_model: str | Path,
+    out_json: str | Path,
+) -> dict[str, Any]:
+    """Choose tau and kernel size by F0.5 on the validation part and write the tuned model.
+
+    Returns:
+        tau, kernel_size, the validation scores there, the scores at every tau (``curve``) and the
+        best of every kernel size tried (``kernel_sizes``).
+    """
+    trained, card = read_model(model)
+    parts = pd.read_csv(split, dtype={"crop": str})
+    ids = set(parts.loc[parts["part"] == "validation", "crop"])
+    samples = load(list(voxel_manifests), ids).samples
+    tuned, card, result = choose(trained, card, samples, settings)
+    write_model(out_model, tuned, card)
+    write_json(out_json, result)
+    return result
+
+
+def choose(
+    model: VoxelModel,
+    card: ModelCard,
+    validation: Sequence[VoxelSample],
+    settings: TuningSettings,
+) -> tuple[VoxelModel, ModelCard, dict[str, Any]]:
+    """The model at its best kernel size, its card with tau, and the result of ``tune``."""
+    candidates: list[VoxelModel] = [model]
+    if isinstance(model, SceneNet):
+        sizes = [size for size in settings.kernel_sizes if size != model.kernel_size]
+        candidates += [model.with_kernel_size(size) for size in sizes]
+    tried = []
+    for candidate in candidates:
+        curve = threshold_curve(candidate, validation, card.measurement)
+        tau, counts = curve.best()
+        tried.append((counts.f05, tau, candidate, curve, counts))
+    # The size it was trained with comes first and wins a tie.
+    _, tau, tuned, curve, counts = max(tried, key=lambda entry: entry[0])
+    result = {
+        "model": card.name,
+        "tau": tau,
+        "kernel_size": list(tuned.kernel_size),
+        "validation": counts.scores() | {"tau": tau, "n_samples": len(validation)},
+        "curve": curve_columns(curve),
+        "kernel_sizes": [
+            {"kernel_size": list(c.kernel_size), "tau": t, **n.scores()} for _, t, c, _, n in tried
+        ],
+    }
+    return tuned, card.with_tau(tau), result
+
+
+def curve_columns(curve: ThresholdCurve) -> dict[str, list[float]]:
+    """Precision, recall and F0.5 at every tau, as plain lists."""
+    precision, recall = curve.precision_recall()
+    confusions = [curve.confusion(step).f05 for step in range(len(curve.tau))]
+    return {
+        "tau": curve.tau.tolist(),
+        "precision": precision.tolist(),
+        "recall": recall.tolist(),
+        "f05": confusions,
+    }
+
+
+def champion(
+    models: Sequence[str | Path], tunings: Sequence[str | Path], out_model: str | Path
+) -> dict[str, Any]:
+    """Copy the model with the highest validation F0.5; the first of equals.
+
+    Args:
+        models, tunings: outputs of ``tune``, in the same order.
+    """
+    results = [read_json(path) for path in tunings]
+    best = max(range(len(results)), key=lambda i: results[i]["validation"]["f05"])
+    with atomic(out_model) as partial:
+        shutil.copyfile(models[best], partial)
+    return {"chosen": Path(models[best]).name, "validation": results[best]["validation"]}

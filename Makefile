@@ -1,0 +1,38 @@
+# Two commands: `make reproduce` makes every result, `make test` runs the tests.
+# Both make .venv with the tested versions first, if it is not there or out of date.
+
+PYTHON ?= python3
+CORES ?= 2
+VENV := .venv
+INSTALLED := $(VENV)/.installed
+
+.PHONY: reproduce test lint clean help
+
+reproduce: $(INSTALLED)  ## all results of the default configuration, under results/
+	$(VENV)/bin/snakemake --cores $(CORES)
+
+test: $(INSTALLED)  ## the tests
+	$(VENV)/bin/python -m pytest
+
+lint: $(INSTALLED)  ## style, types, formatting
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/snakefmt --check Snakefile workflow
+
+clean:  ## remove what Python and the tools leave behind; results stay
+	rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find scenenet workflow tests -name __pycache__ -prune -exec rm -rf {} +
+
+help:  ## this list
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST)
+
+$(INSTALLED): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "scenenet needs Python 3.11 or later; name one with: make PYTHON=python3.12"; exit 1; }
+	@$(PYTHON) -c 'import ensurepip' 2>/dev/null || \
+	  { echo "Python's venv is not installed; on Debian or Ubuntu: apt install python3-venv"; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  -c constraints.txt -e '.[dev]'
+	touch $@

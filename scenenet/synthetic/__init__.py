@@ -1,0 +1,25 @@
+"""Procedural corridor surveys with known truth (thesis 5.1), for who has no survey at hand."""
+
+from __future__ import annotations
+
+from scenenet.synthetic.corridor import (
+    Corridor,
+    Stretch,
+    TrueTower,
+    corridor_cloud,
+    make_corridor,
+    make_survey,
+    towers_geojson,
+)
+from scenenet.synthetic.settings import SyntheticSettings
+
+__all__ = [
+    "Corridor",
+    "Stretch",
+    "SyntheticSettings",
+    "TrueTower",
+    "corridor_cloud",
+    "make_corridor",
+    "make_survey",
+    "towers_geojson",
+]

@@ -1,0 +1,232 @@
+"""Towers as members (bars, tubes, strings), and the points a scanner gets from them.
+
+In a tower's own frame x runs along the cross-arms, y along the line, z up; the origin is the centre
+of the foot. To add a kind of tower, write a function (height, circuits, earth_wires) -> Structure,
+list it in ``KINDS`` and name it in ``settings.Kind``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+BELOW_GROUND_M = 1.5
+"""How far legs go on below the foot, so that none hangs in the air on a slope."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A tower in its own frame.
+
+    Attributes:
+        members: (M, 8): both ends (x, y, z, x, y, z; m) and the radius at each of them (m).
+        attachments: (W, 3), m: where wires hold on. The conductors of a circuit from left to right
+            (two circuits: left side from below, then right side), then the earth wires.
+        half_base: half the side of the foot, m.
+    """
+
+    members: np.ndarray
+    attachments: np.ndarray
+    half_base: float
+
+
+class _Frame:
+    """Collects members."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[float, ...]] = []
+
+    def bar(self, a: tuple, b: tuple, radius: float, end_radius: float | None = None) -> None:
+        self._rows.append((*a, *b, radius, radius if end_radius is None else end_radius))
+
+    def array(self) -> np.ndarray:
+        return np.asarray(self._rows, dtype=np.float64)
+
+
+def _lattice_body(
+    frame: _Frame, levels: np.ndarray, halves: np.ndarray, leg: float, brace: float
+) -> None:
+    """Four legs and X-braced faces: a square of half side ``halves[k]`` at height ``levels[k]``."""
+    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    for k in range(len(levels) - 1):
+        z0, z1, h0, h1 = levels[k], levels[k + 1], halves[k], halves[k + 1]
+        for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
+            frame.bar((ax * h0, ay * h0, z0), (ax * h1, ay * h1, z1), leg)
+            if z0 >= 0:
+                frame.bar((ax * h0, ay * h0, z0), (bx * h1, by * h1, z1), brace)
+                frame.bar((bx * h0, by * h0, z0), (ax * h1, ay * h1, z1), brace)
+                frame.bar((ax * h1, ay * h1, z1), (bx * h1, by * h1, z1), brace)
+
+
+def _truss_arm(frame: _Frame, reach: float, z: float, half: float, depth: float) -> None:
+    """A cross-arm from the body to its tip at (reach, 0, z); the sign of reach is the side."""
+    side = np.sign(reach)
+    tip = (reach, 0.0, z)
+    for y in (-half, half):
+        frame.bar((side * half, y, z), tip, 0.04)
+        frame.bar((side * half, y, z + depth), tip, 0.04)
+    for share in (0.3, 0.6):
+        x = side * half + share * (reach - side * half)
+        y = half * (1 - share)
+        frame.bar((x, -y, z), (x, y, z), 0.03)
+        frame.bar((x, -y, z), (x, -y, z + depth * (1 - share)), 0.03)
+        frame.bar((x, y, z), (x, y, z + depth * (1 - share)), 0.03)
+
+
+def _hang(
+    frame: _Frame, points: list[tuple[float, float, float]], length: float
+) -> list[tuple[float, float, float]]:
+    """Insulator strings below ``points``; returns their lower ends."""
+    ends = [(x, y, z - length) for x, y, z in points]
+    for point, end in zip(points, ends, strict=True):
+        frame.bar(point, end, 0.07)
+    return ends
+
+
+def _pole_head(
+    frame: _Frame, height: float, circuits: int, earth_wires: int, reach: float, drop: float
+) -> list[tuple[float, float, float]]:
+    """Cross-arms of a pole: a triangle for one circuit, three storeys for two."""
+    top = height - (1.0 if earth_wires else 0.0)
+    # Pins or short strings: the lower conductors ride just above their arm.
+    pin = 0.2
+    if circuits == 1:
+        arm = top - drop
+        frame.bar((-reach, 0, arm), (reach, 0, arm), 0.07)
+        ends = [(-reach, 0.0, arm), (0.0, 0.0, top - pin), (reach, 0.0, arm)]
+    else:
+        storeys = [top - 2 * drop - 0.3, top - drop - 0.3, top - 0.3]
+        for z in storeys:
+            frame.bar((-reach, 0, z), (reach, 0, z), 0.07)
+        ends = [(side * reach, 0.0, z) for side in (-1, 1) for z in storeys]
+    for x, y, z in ends:
+        frame.bar((x, y, z), (x, y, z + pin), 0.06)
+    points = [(x, y, z + pin) for x, y, z in ends]
+    return points + [(0.0, 0.0, height)] * earth_wires
+
+
+def lattice(height: float, circuits: int, earth_wires: int) -> Structure:
+    """A pylon on a square pyramid (thesis 5.1.2: base 4.15 m at 34.7 m) with truss cross-arms."""
+    frame = _Frame()
+    base, waist, shoulder = 0.06 * height, 0.024 * height, 0.016 * height
+    peak = 0.94 * height
+    panels = max(4, round(height / 3.5))
+    # Panels shorten upwards with the width of the body.
+    levels = peak * (1 - (1 - np.linspace(0, 1, panels + 1)) ** 1.25)
+    waist_z = 0.65 * height
+    halves = np.interp(levels, [0, waist_z, peak], [base, waist, shoulder])
+    leg, brace = 0.06, 0.035
+    below = base + (base - waist) / waist_z * BELOW_GROUND_M
+    _lattice_body(frame, np.r_[-BELOW_GROUND_M, levels], np.r_[below, halves], leg, brace)
+    for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+        frame.bar((sx * shoulder, sy * shoulder, peak), (0, 0, height), 0.04)
+    if circuits == 1:
+        arms = [(-0.12, 0.74), (0.11, 0.86), (0.12, 0.74)]
+    else:
+        storeys = [(0.11, 0.66), (0.14, 0.77), (0.1, 0.88)]
+        arms = [(side * reach, z) for side in (-1, 1) for reach, z in storeys]
+    tips = []
+    for reach, share in arms:
+        z = share * height
+        half = float(np.interp(z, levels, halves))
+        _truss_arm(frame, reach * height, z, half, 0.035 * height)
+        tips.append((reach * height, 0.0, z))
+    points = _hang(frame, tips, min(2.0, 0.045 * height))
+    points += [(0.0, 0.0, height)] * earth_wires
+    return Structure(frame.array(), np.asarray(points), base)
+
+
+def lattice_pole(height: float, circuits: int, earth_wires: int) -> Structure:
+    """A slender braced column, 0.8 m at the foot, as medium-voltage lines have them."""
+    frame = _Frame()
+    levels = np.linspace(0, height, max(6, round(height / 1.3)) + 1)
+    halves = np.linspace(0.4, 0.16, len(levels))
+    _lattice_body(
+        frame, np.r_[-BELOW_GROUND_M, levels], np.r_[halves[0], halves], leg=0.035, brace=0.012
+    )
+    points = _pole_head(frame, height, circuits, earth_wires, reach=1.3, drop=1.6)
+    return Structure(frame.array(), np.asarray(points), 0.4)
+
+
+def tubular(height: float, circuits: int, earth_wires: int) -> Structure:
+    """A tapered steel or concrete pole."""
+    frame = _Frame()
+    frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), 0.013 * height, 0.12)
+    points = _pole_head(frame, height, circuits, earth_wires, reach=1.1, drop=1.5)
+    return Structure(frame.array(), np.asarray(points), 0.3)
+
+
+def wooden(height: float, circuits: int, earth_wires: int) -> Structure:
+    """A wooden pole with a wooden cross-arm and its two struts."""
+    frame = _Frame()
+    frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), 0.17, 0.11)
+    points = _pole_head(frame, height, circuits, earth_wires, reach=1.4, drop=0.9)
+    arm = points[0][2] - 0.2
+    for side in (-1, 1):
+        frame.bar((0, 0, arm - 0.9), (side * 0.9, 0, arm), 0.05)
+    return Structure(frame.array(), np.asarray(points), 0.2)
+
+
+def h_frame(height: float, circuits: int, earth_wires: int) -> Structure:
+    """Two poles, a beam across them and an X between them; conductors side by side."""
+    frame = _Frame()
+    half, beam = 0.1 * height, height - 0.8
+    for side in (-1, 1):
+        frame.bar((side * half, 0, -BELOW_GROUND_M), (side * half, 0, height), 0.19, 0.12)
+        frame.bar((side * half, 0, 0.55 * height), (-side * half, 0, 0.8 * height), 0.05)
+    reach = 2.0 * half
+    frame.bar((-reach, 0, beam), (reach, 0, beam), 0.1)
+    shares = (-1.0, 0.0, 1.0) if circuits == 1 else (-1.0, -0.65, -0.3, 0.3, 0.65, 1.0)
+    points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.6)
+    points += [(half, 0.0, height)] * earth_wires
+    return Structure(frame.array(), np.asarray(points), half)
+
+
+KINDS: Mapping[str, Callable[[float, int, int], Structure]] = MappingProxyType(
+    {
+        "lattice": lattice,
+        "lattice_pole": lattice_pole,
+        "tubular": tubular,
+        "wooden": wooden,
+        "h_frame": h_frame,
+    }
+)
+
+
+def sample(members: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
+    """Points (N, 3) on the surface of ``members`` (M, 8), ``density`` per m^2 everywhere.
+
+    The side away from the scanner returns as well: a helicopter passes from several directions and
+    nothing is occluded (thesis 5.1.1).
+    """
+    start, end = members[:, :3], members[:, 3:6]
+    axis = end - start
+    length = np.linalg.norm(axis, axis=1)
+    surface = length * np.pi * (members[:, 6] + members[:, 7])
+    count = rng.poisson(surface * density)
+    which = np.repeat(np.arange(len(members)), count)
+    along = rng.random(len(which))
+    angle = rng.random(len(which)) * (2 * np.pi)
+    radius = members[which, 6] * (1 - along) + members[which, 7] * along
+    unit = axis / length[:, None]
+    # Any vector that is not parallel to the member spans the circle around it.
+    helper = np.where(np.abs(unit[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    first = np.cross(unit, helper)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(unit, first)
+    circle = np.cos(angle)[:, None] * first[which] + np.sin(angle)[:, None] * second[which]
+    return start[which] + along[:, None] * axis[which] + radius[:, None] * circle
+
+
+def place(points: np.ndarray, x: float, y: float, z: float, azimuth: float) -> np.ndarray:
+    """Points (N, 3) of a tower's frame put at (x, y, z) in a line that runs towards ``azimuth``.
+
+    The azimuth is in radians, counter-clockwise from east.
+    """
+    cos, sin = np.cos(azimuth), np.sin(azimuth)
+    across, along, up = points.T
+    # x of the tower points to the right of the line's direction.
+    return np.column_stack((x + along * cos + across * sin, y + along * sin - across * cos, z + up))

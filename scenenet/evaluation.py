@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from scenenet.crops import Crop
 from scenenet.detection import DetectionSettings, detect_towers
 from scenenet.metrics import Confusion, ThresholdCurve, TowerMatch, confusion, match_towers
 from scenenet.modelfile import ModelCard, read_model
@@ -17,6 +18,7 @@ from scenenet.progress import track
 from scenenet.training import probabilities
 from scenenet.tuning import curve_columns
 from scenenet.voxel_store import Dataset, load
+from scenenet.voxels import VoxelSample
 
 
 def evaluate(
@@ -59,16 +61,7 @@ def score(
         occupied += confusion(probability[sample.index], truth[sample.index], tau)
         of_sample = ThresholdCurve.of(probability, truth)
         curve = of_sample if curve is None else curve + of_sample
-        # A tower is made of points: a detected voxel that is empty has nothing to show a person.
-        detected = sample.index[probability[sample.index] >= tau]
-        found = detect_towers(
-            sample.grid.centres(detected),
-            probability[detected],
-            sample.grid.centres(sample.index),
-            sample.grid.voxel_size,
-            detection,
-        )
-        match = match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)
+        match = crop_towers(sample, crop, probability, tau, detection)
         towers += match
         per_sample.append(
             {
@@ -96,3 +89,27 @@ def score(
         "pr_curve": {} if curve is None else curve_columns(curve),
         "average_precision": 0.0 if curve is None else curve.average_precision(),
     }
+
+
+def crop_towers(
+    sample: VoxelSample,
+    crop: Crop,
+    probability: np.ndarray,
+    tau: float,
+    detection: DetectionSettings,
+) -> TowerMatch:
+    """Towers found in a crop against the true ones.
+
+    Args:
+        probability: (V,) of every voxel of the sample's grid.
+    """
+    # A tower is made of points: a detected voxel that is empty has nothing to show a person.
+    detected = sample.index[probability[sample.index] >= tau]
+    found = detect_towers(
+        sample.grid.centres(detected),
+        probability[detected],
+        sample.grid.centres(sample.index),
+        sample.grid.voxel_size,
+        detection,
+    )
+    return match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)

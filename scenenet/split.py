@@ -22,9 +22,9 @@ GUARD = "guard"
 class SplitSettings(Settings):
     """Shares of the crops, and what counts as neighbouring."""
 
-    train: float = Field(0.2, gt=0, lt=1, description="share of the crops to train on")
-    validation: float = Field(0.1, gt=0, lt=1, description="share to tune on")
-    test: float = Field(0.7, gt=0, lt=1, description="share to test on")
+    train: float = Field(0.2, gt=0, le=1, description="share of the crops to train on")
+    validation: float = Field(0.1, ge=0, lt=1, description="share to tune on")
+    test: float = Field(0.7, ge=0, lt=1, description="share to test on")
     stretch: int = Field(4, ge=1, description="consecutive towers that stay together")
     neighbour: float = Field(
         500.0,
@@ -39,6 +39,10 @@ class SplitSettings(Settings):
         if abs(self.train + self.validation + self.test - 1) > 1e-6:
             raise ValueError("train, validation and test must sum to 1")
         return self
+
+    def parts(self) -> list[str]:
+        """The parts that get a share."""
+        return [part for part in PARTS if getattr(self, part) > 0]
 
 
 def split_crops(manifests: Sequence[str | Path], settings: SplitSettings) -> pd.DataFrame:
@@ -60,14 +64,15 @@ def split_crops(manifests: Sequence[str | Path], settings: SplitSettings) -> pd.
     """
     tables = [_stretches(path, settings) for path in manifests]
     table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
-    if len(table) < len(PARTS):
+    wanted = settings.parts()
+    if len(table) < len(wanted):
         raise InputError(
-            f"{len(table)} crops cannot be split into {', '.join(PARTS)}",
+            f"{len(table)} crops cannot be split into {', '.join(wanted)}",
             remedy="Add surveys with labelled towers to the sheet, role train",
         )
     table["part"] = table["stretch"].map(_draw(table["stretch"], settings))
     table.loc[_guards(table), "part"] = GUARD
-    missing = [part for part in PARTS if part not in set(table["part"])]
+    missing = [part for part in wanted if part not in set(table["part"])]
     if missing:
         raise InputError(
             f"no crop is left for {', '.join(missing)} among {len(table)} crops in "
@@ -110,12 +115,12 @@ def _draw(stretch: pd.Series, settings: SplitSettings) -> dict[str, str]:
     """Part of each stretch: in random order, each to the part that lacks the largest share."""
     sizes = stretch.value_counts(sort=False)
     order = np.random.default_rng(settings.seed).permutation(len(sizes))
-    wanted = {part: getattr(settings, part) * len(stretch) for part in PARTS}
-    filled = dict.fromkeys(PARTS, 0)
+    wanted = {part: getattr(settings, part) * len(stretch) for part in settings.parts()}
+    filled = dict.fromkeys(wanted, 0)
     drawn = {}
     for i in order:
         name, size = sizes.index[i], int(sizes.iloc[i])
-        part = max(PARTS, key=lambda p: (wanted[p] - filled[p]) / wanted[p])
+        part = max(wanted, key=lambda p: (wanted[p] - filled[p]) / wanted[p])
         drawn[name] = part
         filled[part] += size
     return drawn

@@ -1,0 +1,281 @@
+"""The command line: the chain for people without Snakemake.
+
+Answers go to stdout, progress and messages to stderr. Exit code 0: done; 1: the input is at fault
+and the message says how; 2: the call is.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from scenenet.errors import InputError
+
+app = typer.Typer(
+    help="Find power-line towers in LiDAR surveys with SCENE-Net: eleven numbers with a meaning.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+class Codes(StrEnum):
+    """Class schemes; see ``scenenet.pointcloud.schemes``."""
+
+    edp = "edp"
+    asprs = "asprs"
+
+
+class Fit(StrEnum):
+    """Grids; see ``scenenet.voxels``."""
+
+    cube = "cube"
+    metric = "metric"
+
+
+class Kind(StrEnum):
+    """Architectures; see ``scenenet.models``."""
+
+    scenenet = "scenenet"
+    cnn = "cnn"
+
+
+Surveys = Annotated[
+    list[Path], typer.Argument(help="LAS, LAZ or COPC surveys, TS40K .npy or .pt samples.")
+]
+Labelled = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Labelled surveys (LAS, LAZ, COPC), TS40K .npy or .pt samples, folders of samples."
+    ),
+]
+ModelFile = Annotated[Path, typer.Option("--model", help="Model file (.json or .safetensors).")]
+LabelCodes = Annotated[
+    Codes,
+    typer.Option("--codes", help="What the class codes mean; wires are 16 in edp, 14 in asprs."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the answer as JSON on stdout.")]
+
+
+@app.command()
+def check(
+    surveys: Surveys,
+    codes: Annotated[
+        Codes | None, typer.Option(help="What the class codes mean, if they are to be named.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Say what is in surveys and what is wrong with them."""
+    from scenenet.pointcloud.check import check_survey
+
+    reports, errors = [], []
+    for survey in surveys:
+        try:
+            reports.append(check_survey(survey, None if codes is None else codes.value))
+        except InputError as error:
+            errors.append(error)
+    if as_json:
+        print(json.dumps([report.to_dict() for report in reports], indent=2))
+    else:
+        print("\n\n".join(report.text() for report in reports))
+    for error in errors:
+        print(f"error: {error}", file=sys.stderr)
+    if errors:
+        raise typer.Exit(1)
+
+
+@app.command()
+def synth(
+    out: Annotated[Path, typer.Argument(help="The survey to write (.laz).")],
+    towers: Annotated[int, typer.Option(min=1, help="Number of towers.")] = 10,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same survey.")] = 0,
+    truth: Annotated[
+        Path | None, typer.Option(help="Also write the labels before annotation noise (.laz).")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a synthetic corridor: a labelled survey of a power line (EDP codes)."""
+    from scenenet.synthetic import SyntheticSettings, make_survey
+
+    settings = SyntheticSettings(towers=towers, seed=seed)
+    summary = make_survey(settings, out, truth=truth, progress=out.name)
+    _answer(summary, as_json, lambda s: [f"{out}: {s['points']:,} points, {towers} towers"])
+
+
+@app.command()
+def train(
+    labelled: Labelled,
+    codes: LabelCodes,
+    out: Annotated[
+        Path, typer.Option("--out", help="Model file to write (.json; .safetensors for a cnn).")
+    ],
+    kind: Annotated[Kind, typer.Option(help="Architecture.")] = Kind.scenenet,
+    seeds: Annotated[int, typer.Option(min=1, help="Models to train; the best is kept.")] = 5,
+    epochs: Annotated[int, typer.Option(min=1, help="Passes over the crops.")] = 150,
+    learning_rate: Annotated[float, typer.Option(help="Step size of RMSProp.")] = 0.01,
+    resolution: Annotated[
+        int, typer.Option(help="Voxels an edge of a crop: 32, 64, 128, 256.")
+    ] = 64,
+    validation: Annotated[
+        float, typer.Option(min=0, max=0.9, help="Share of the crops that tau is tuned on.")
+    ] = 0.3,
+    as_json: AsJson = False,
+) -> None:
+    """Train a model on labelled crops or surveys."""
+    from scenenet.labelled import train_files
+    from scenenet.protocol import ModelSettings, TrainingSettings, TuningSettings
+
+    training = TrainingSettings(epochs=epochs, learning_rate=learning_rate)
+    settings = ModelSettings(name=out.stem.lower() or kind, kind=kind, training=training)
+    result = train_files(
+        labelled,
+        codes.value,
+        _cube(resolution),
+        settings,
+        TuningSettings(kernel_sizes=((9, 7, 7), (9, 5, 5), (13, 7, 7))),
+        range(seeds),
+        validation,
+        {"files": [path.name for path in labelled]},
+        out,
+    )
+    _answer(result, as_json, _training_lines)
+
+
+@app.command()
+def predict(
+    surveys: Surveys,
+    model: ModelFile,
+    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")],
+    voxel_size: Annotated[
+        float | None,
+        typer.Option(help="Edge of a voxel in m; as the model was trained if not given."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Classify surveys: DIR/NAME.laz, NAME.towers.geojson and NAME.summary.json for each."""
+    from scenenet.detection import DetectionSettings
+    from scenenet.inference import PredictSettings, predict_survey
+
+    names = [survey.stem for survey in surveys]
+    if twice := sorted({name for name in names if names.count(name) > 1}):
+        raise InputError(
+            f"two surveys are called {', '.join(twice)} and would overwrite each other",
+            remedy="Predict them one by one into different folders",
+        )
+    settings = PredictSettings(voxel_size=voxel_size)
+    summaries = []
+    for survey in surveys:
+        target = out / f"{survey.stem.removesuffix('.copc')}.laz"
+        if target.resolve() == survey.resolve():
+            raise InputError(
+                "the result would overwrite the survey", file=survey, remedy="Name another --out"
+            )
+        summaries.append(
+            predict_survey(
+                survey,
+                model,
+                target,
+                target.with_suffix(".towers.geojson"),
+                target.with_suffix(".summary.json"),
+                settings,
+                DetectionSettings(),
+            )
+        )
+    _answer(
+        summaries,
+        as_json,
+        lambda all_: [
+            f"{s['survey']}: {s['towers']} towers among {s['points']:,} points" for s in all_
+        ],
+    )
+
+
+@app.command()
+def evaluate(
+    labelled: Labelled,
+    model: ModelFile,
+    codes: LabelCodes,
+    fit: Annotated[
+        Fit,
+        typer.Option(
+            help="cube: a grid over the bounding cube of each crop, as the thesis; "
+            "metric: the model's own voxel size, and towers looked for in whole surveys."
+        ),
+    ] = Fit.cube,
+    resolution: Annotated[
+        int, typer.Option(help="Voxels an edge for --fit cube: 32, 64, 128, 256.")
+    ] = 64,
+    as_json: AsJson = False,
+) -> None:
+    """Score a model on labelled crops or surveys: voxels and towers."""
+    from scenenet.detection import DetectionSettings
+    from scenenet.labelled import evaluate_files
+
+    grid = _cube(resolution) if fit is Fit.cube else None
+    result = evaluate_files(labelled, model, codes.value, grid, DetectionSettings())
+    for skipped in result["skipped"]:
+        print(f"not scored: {skipped['sample']}: {skipped['reason']}", file=sys.stderr)
+    _answer(result, as_json, _score_lines)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; errors of the input end with their message and code 1."""
+    try:
+        app(arguments)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(1)
+    except KeyboardInterrupt:
+        print("interrupted; nothing was left half-written", file=sys.stderr)
+        sys.exit(130)
+
+
+def _cube(resolution: int) -> Any:
+    from scenenet.voxels import VoxelSettings
+
+    if resolution not in (32, 64, 128, 256):
+        raise typer.BadParameter("must be 32, 64, 128 or 256", param_hint="--resolution")
+    return VoxelSettings(fit="cube", resolution=resolution)
+
+
+def _answer(data: Any, as_json: bool, lines: Callable[[Any], list[str]]) -> None:
+    print(json.dumps(data, indent=2) if as_json else "\n".join(lines(data)))
+
+
+def _training_lines(result: dict[str, Any]) -> list[str]:
+    scores, crops = result["scores"], result["crops"]
+    lines = [
+        f"{result['model']}: the best of {len(result['seeds'])} seeds (seed {result['seed']}), "
+        f"{crops['training']} crops to train on, {crops['validation']} to tune on",
+        f"tau {result['tau']:.3f}, kernel {'x'.join(map(str, result['kernel_size']))}, "
+        f"on the {result['tuned_on']} crops: P {scores['precision']:.2f} "
+        f"R {scores['recall']:.2f} F0.5 {scores['f05']:.3f} tower IoU {scores['iou_tower']:.3f}",
+    ]
+    return lines + [f"left out: {s['sample']}: {s['reason']}" for s in result["skipped"]]
+
+
+def _score_lines(result: dict[str, Any]) -> list[str]:
+    def row(name: str, scores: dict[str, float]) -> str:
+        return f"{name:<22}" + "".join(
+            f"{scores[key]:>10.3f}" for key in ("precision", "recall", "f05", "iou_tower", "miou")
+        )
+
+    towers = result["towers"]
+    error = towers["median_error_m"]
+    return [
+        f"{'':<22}" + "".join(f"{n:>10}" for n in ("P", "R", "F0.5", "tower IoU", "macro IoU")),
+        row(result["model"], result["voxel"]),
+        row("  occupied voxels only", result["voxel_occupied"]),
+        row("predicting nothing", result["voxel_trivial"]),
+        f"{result['voxel']['n_samples']} crops, tau {result['voxel']['tau']:.3f}",
+        f"towers: {towers['n_predicted']} found, {towers['n_true']} true, "
+        f"precision {towers['precision']:.2f}, recall {towers['recall']:.2f}"
+        + ("" if error is None else f", median position error {error:.2f} m"),
+    ]

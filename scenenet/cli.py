@@ -85,8 +85,8 @@ def check(
         print(json.dumps([report.to_dict() for report in reports], indent=2))
     else:
         print("\n\n".join(report.text() for report in reports))
-    for error in errors:
-        print(f"error: {error}", file=sys.stderr)
+    for message in errors:
+        print(f"error: {message}", file=sys.stderr)
     if errors:
         raise typer.Exit(1)
 

@@ -19,6 +19,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+Shape = tuple[int, int, int]
+"""(D, H, W): voxels along z, y, x."""
+
 
 @dataclass(frozen=True)
 class Occupancy:
@@ -34,14 +37,14 @@ class Occupancy:
     zyx: np.ndarray
     values: np.ndarray
     offsets: np.ndarray
-    shape: tuple[int, int, int]
+    shape: Shape
 
     @classmethod
     def of_grids(
         cls,
         indices: Sequence[np.ndarray],
         values: Sequence[np.ndarray],
-        shape: tuple[int, int, int],
+        shape: Shape,
     ) -> Occupancy:
         """Gather grids given by flat C-order indices (M_b,) and their values (M_b,)."""
         offsets = np.zeros(len(indices) + 1, np.int64)
@@ -49,7 +52,7 @@ class Occupancy:
         flat = np.concatenate([*indices, np.empty(0, np.int64)]).astype(np.int64)
         zyx = np.stack(np.unravel_index(flat, shape), axis=1).astype(np.int32)
         joined = np.concatenate([*values, np.empty(0, np.float32)]).astype(np.float32)
-        return cls(np.ascontiguousarray(zyx), joined, offsets, tuple(shape))
+        return cls(np.ascontiguousarray(zyx), joined, offsets, shape)
 
     def __len__(self) -> int:
         return len(self.offsets) - 1

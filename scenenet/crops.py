@@ -130,7 +130,8 @@ def _cut(
         ):
             records = np.fromfile(spool, _RECORD)
             inside = np.linalg.norm(centres - centre, axis=1) <= radius
-            crop = Crop(f"{survey}-{number:04d}", *centre.tolist(), radius, centres[inside])
+            x, y = centre.tolist()
+            crop = Crop(f"{survey}-{number:04d}", x, y, float(radius), centres[inside])
             xyz = np.ascontiguousarray(records["xyz"])
             yield crop, PointCloud(xyz, records["classification"].copy(), scheme)
 

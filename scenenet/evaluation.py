@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from scenenet.crops import Crop
 from scenenet.detection import DetectionSettings, detect_towers
@@ -15,6 +14,7 @@ from scenenet.metrics import Confusion, ThresholdCurve, TowerMatch, confusion, m
 from scenenet.modelfile import ModelCard, read_model
 from scenenet.models import VoxelModel
 from scenenet.progress import track
+from scenenet.split import crops_in
 from scenenet.training import probabilities
 from scenenet.tuning import curve_columns
 from scenenet.voxel_store import Dataset, load
@@ -30,8 +30,7 @@ def evaluate(
 ) -> dict[str, Any]:
     """Scores of a tuned model on one part of the split (see ``score``)."""
     trained, card = read_model(model)
-    parts = pd.read_csv(split, dtype={"crop": str})
-    dataset = load(list(voxel_manifests), set(parts.loc[parts["part"] == part, "crop"]))
+    dataset = load(voxel_manifests, crops_in(split, part))
     return {"part": part} | score(trained, card, dataset, detection)
 
 

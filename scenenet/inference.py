@@ -17,7 +17,7 @@ from scenenet.coverage import LOOK_M, edge_distance
 from scenenet.detection import DetectedTower, DetectionSettings, detect_towers
 from scenenet.errors import InputError
 from scenenet.files import write_json
-from scenenet.pointcloud import add_dimensions, iter_chunks
+from scenenet.pointcloud import add_dimensions, iter_chunks, survey_info
 from scenenet.progress import track
 from scenenet.settings import Settings
 from scenenet.tiles import EDGE, Tile, TileSpool, code_of, groups
@@ -104,12 +104,11 @@ def predict_survey(
     name = Path(path).name
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
         spool = TileSpool(Path(scratch), voxel_size)
-        n_points, crs = 0, None
+        n_points, crs = 0, survey_info(path).crs
         chunks = iter_chunks(path, chunk_points=settings.chunk_points)
         for chunk in track(chunks, f"{name}: chunks read"):
             spool.add(chunk.xyz)
             n_points += len(chunk)
-            crs = chunk.crs
         answers = TileAnswers(spool, Path(scratch), len(geneos))
         answers.compute(trained, card, f"{name}: tiles predicted")
         towers = answers.find_towers(tau, detection)
@@ -293,8 +292,9 @@ def answer_tile(
     from scenenet.convolution import Occupancy, convolve
     from scenenet.models import SceneNet
 
-    reach = tuple(k // 2 for k in model.kernel_size)
-    shape = tuple(EDGE + 2 * r for r in reach)
+    kz, ky, kx = model.kernel_size
+    reach = kz // 2, ky // 2, kx // 2
+    shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
     scene = spool.around(tile.place, reach)
     density = card.measurement == "density"
     phi = scene.count / fullest if density else np.ones(len(scene.count))

@@ -57,7 +57,7 @@ def negativity(model: VoxelModel, settings: LossSettings) -> Tensor:
     """
     if not isinstance(model, SceneNet):
         return torch.zeros(())
-    shapes = torch.stack([value for shape in model.shapes.values() for value in shape.values()])
+    shapes = torch.stack([v for name in model.names for v in model.shape_of(name).values()])
     mixing = model.mixing_weights()
     return (
         settings.rho_shape * torch.relu(-shapes).sum()

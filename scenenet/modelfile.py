@@ -13,7 +13,7 @@ from scenenet.errors import InputError
 from scenenet.files import atomic, write_json
 from scenenet.geneo import kernel_named
 from scenenet.models import CNN, SceneNet, VoxelModel
-from scenenet.protocol import Measurement
+from scenenet.protocol import KernelSize, Measurement
 from scenenet.settings import Settings
 from scenenet.voxels import Fit
 
@@ -95,7 +95,7 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
         return _read_scenenet(json.loads(path.read_text(encoding="utf-8")))
     except InputError as error:
         raise InputError(error.problem, file=path, remedy=error.remedy) from None
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(
             f"not a readable model file ({type(error).__name__}: {error})",
             file=path,
@@ -119,8 +119,7 @@ def _numbers(model: SceneNet) -> dict[str, Any]:
 
 def _read_scenenet(data: Mapping[str, Any]) -> tuple[SceneNet, ModelCard]:
     _check_head(data)
-    size = tuple(int(k) for k in data["kernel_size"])
-    model = SceneNet([entry["kernel"] for entry in data["geneos"]], size)
+    model = SceneNet([entry["kernel"] for entry in data["geneos"]], _size(data))
     numbers = {
         f"{entry['name']}.{symbol}": float(parameter["value"])
         for entry in data["geneos"]
@@ -142,7 +141,7 @@ def _read_cnn(path: Path) -> tuple[CNN, ModelCard]:
     except SafetensorError as error:
         raise ValueError(str(error)) from None
     _check_head(head)
-    model = CNN(len(tensors["bias"]), tuple(head["kernel_size"]))
+    model = CNN(len(tensors["bias"]), _size(head))
     model.load_state_dict(tensors)
     return model, _card(head)
 
@@ -157,6 +156,11 @@ def _check_head(data: Mapping[str, Any]) -> None:
             f"model format {data['format_version']}, this version reads {FORMAT_VERSION}",
             remedy="Use the version of scenenet that wrote it, or train it again",
         )
+
+
+def _size(data: Mapping[str, Any]) -> KernelSize:
+    kz, ky, kx = (int(k) for k in data["kernel_size"])
+    return kz, ky, kx
 
 
 def _card(data: Mapping[str, Any]) -> ModelCard:

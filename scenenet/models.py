@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -68,7 +69,7 @@ class SceneNet(VoxelModel):
         super().__init__()
         if not geneos:
             raise InputError("a SCENE-Net needs at least one GENEO kernel")
-        self.kernel_size = tuple(kernel_size)
+        self.kernel_size = kernel_size
         self.geneos = list(geneos)
         self.names = _distinct(self.geneos)
         self.shapes = nn.ModuleDict()
@@ -84,6 +85,10 @@ class SceneNet(VoxelModel):
         for name in self.names[:-1]:
             self.mixing[name] = nn.Parameter(highest * torch.rand((), generator=generator))
 
+    def shape_of(self, name: str) -> dict[str, Tensor]:
+        """Shape parameters of the GENEO called ``name``, by their symbol."""
+        return dict(cast(nn.ParameterDict, self.shapes[name]).items())
+
     def mixing_weights(self) -> Tensor:
         """lambda, (K,), summing to one: the last is 1 minus the others (thesis 4.5)."""
         free = [self.mixing[name] for name in self.names[:-1]]
@@ -95,7 +100,7 @@ class SceneNet(VoxelModel):
         lattice = Lattice.of_size(self.kernel_size)
         return torch.stack(
             [
-                kernel_named(geneo).sample(lattice, self.shapes[name])
+                kernel_named(geneo).sample(lattice, self.shape_of(name))
                 for name, geneo in zip(self.names, self.geneos, strict=True)
             ]
         )
@@ -116,8 +121,8 @@ class SceneNet(VoxelModel):
         """Every trained number and the derived last mixing weight, by a readable name."""
         numbers = {
             f"{name}.{symbol}": float(value.detach())
-            for name, shape in self.shapes.items()
-            for symbol, value in shape.items()
+            for name in self.names
+            for symbol, value in self.shape_of(name).items()
         }
         weights = self.mixing_weights().detach().tolist()
         return numbers | {f"lambda.{n}": w for n, w in zip(self.names, weights, strict=True)}
@@ -137,8 +142,8 @@ class SceneNet(VoxelModel):
         if abs(total - 1) > 1e-4:
             raise InputError(f"mixing weights sum to {total:.6f}, not to 1")
         with torch.no_grad():
-            for name, shape in self.shapes.items():
-                for symbol, value in shape.items():
+            for name in self.names:
+                for symbol, value in self.shape_of(name).items():
                     value.fill_(numbers[f"{name}.{symbol}"])
             for name in self.names[:-1]:
                 self.mixing[name].fill_(numbers[f"lambda.{name}"])
@@ -167,7 +172,7 @@ class CNN(VoxelModel):
     ) -> None:
         """Draw weights and biases from U(-1/sqrt(n), 1/sqrt(n)), n voxels, as torch's Conv3d."""
         super().__init__()
-        self.kernel_size = tuple(kernel_size)
+        self.kernel_size = kernel_size
         bound = float(torch.tensor(kernel_size).prod()) ** -0.5
         weight = torch.rand((n_kernels, *kernel_size), generator=generator)
         bias = torch.rand(n_kernels, generator=generator)

@@ -82,6 +82,12 @@ def split_crops(manifests: Sequence[str | Path], settings: SplitSettings) -> pd.
     return table[["survey", "crop", "stretch", "part", "x", "y"]]
 
 
+def crops_in(split: str | Path, part: str) -> set[str]:
+    """Ids of the crops that the file ``split`` assigns to ``part``."""
+    table = pd.read_csv(split, dtype={"crop": str})
+    return set(table.loc[table["part"] == part, "crop"])
+
+
 def _stretches(manifest: str | Path, settings: SplitSettings) -> pd.DataFrame:
     """Crops of one survey along its line, with the name of the stretch, and whether the one before
     is its neighbour."""

@@ -100,4 +100,5 @@ class StoreReader:
 
     def get(self, name: str) -> dict[str, np.ndarray]:
         """The arrays of group ``name``."""
-        return {key: array[...] for key, array in self._root[name].arrays()}
+        group: Any = self._root[name]
+        return {key: np.asarray(array[...]) for key, array in group.arrays()}

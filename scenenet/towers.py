@@ -13,9 +13,9 @@ from scenenet.pointcloud.samples import sample_files
 from scenenet.settings import Settings
 
 COLUMNS = ("tower", "x", "y", "base", "top", "height", "width", "length", "points", "spacing")
-"""tower: number from 1, along the line. x, y: centre, m. base, top: elevations, m. height: top minus
-base. width, length: sides of the base, m, width <= length. points: labelled points. spacing: m to
-the next tower along the line, NaN behind the last."""
+"""tower: number from 1, along the line. x, y: centre, m. base, top: elevations, m. height: top
+minus base. width, length: sides of the base, m, width <= length. points: labelled points. spacing:
+m to the next tower along the line, NaN behind the last."""
 
 
 class TowerSettings(Settings):
@@ -81,8 +81,8 @@ def cluster(xyz: np.ndarray, settings: TowerSettings) -> np.ndarray:
     local = xyz - xyz.min(axis=0)
     cells = np.floor(local / settings.cell).astype(np.int64)
     _, cell_of, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-    centre = np.stack([np.bincount(cell_of, weights=axis) for axis in local.T], axis=1)
-    centre /= count[:, None]
+    sums = np.stack([np.bincount(cell_of, weights=axis) for axis in local.T], axis=1)
+    centre = sums / count[:, None]
     dbscan = DBSCAN(eps=settings.eps, min_samples=settings.min_points)
     return dbscan.fit_predict(centre, sample_weight=count)[cell_of]
 

@@ -21,6 +21,7 @@ from scenenet.modelfile import ModelCard, write_model
 from scenenet.models import SceneNet, VoxelModel, new_model
 from scenenet.progress import track
 from scenenet.protocol import Measurement, ModelSettings, TrainingSettings
+from scenenet.split import crops_in
 from scenenet.voxel_store import Dataset, load
 from scenenet.voxels import VoxelSample, VoxelSettings
 
@@ -48,9 +49,8 @@ def train(
         checkpoint: file that an interrupted training goes on from; gone when it has ended.
         provenance: kept in the model file beside seed and data fingerprint.
     """
-    parts = pd.read_csv(split, dtype={"crop": str}).groupby("part")["crop"].agg(set)
-    training = load(list(voxel_manifests), parts["train"])
-    validation = load(list(voxel_manifests), parts["validation"])
+    training = load(voxel_manifests, crops_in(split, "train"))
+    validation = load(voxel_manifests, crops_in(split, "validation"))
     trained, history = fit(
         training.samples, validation.samples, model, seed, checkpoint=Path(checkpoint)
     )

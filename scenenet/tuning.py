@@ -7,13 +7,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from scenenet.files import atomic, read_json, write_json
 from scenenet.metrics import ThresholdCurve
 from scenenet.modelfile import ModelCard, read_model, write_model
 from scenenet.models import SceneNet, VoxelModel
 from scenenet.protocol import TuningSettings
+from scenenet.split import crops_in
 from scenenet.training import threshold_curve
 from scenenet.voxel_store import load
 from scenenet.voxels import VoxelSample
@@ -34,9 +33,7 @@ def tune(
         best of every kernel size tried (``kernel_sizes``).
     """
     trained, card = read_model(model)
-    parts = pd.read_csv(split, dtype={"crop": str})
-    ids = set(parts.loc[parts["part"] == "validation", "crop"])
-    samples = load(list(voxel_manifests), ids).samples
+    samples = load(voxel_manifests, crops_in(split, "validation")).samples
     tuned, card, result = choose(trained, card, samples, settings)
     write_model(out_model, tuned, card)
     write_json(out_json, result)

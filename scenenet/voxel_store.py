@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,7 +72,7 @@ class Dataset:
     content: list[str]
 
 
-def load(manifests: list[str | Path], ids: set[str] | None = None) -> Dataset:
+def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Dataset:
     """Read samples back; all of them, or those with ``ids``.
 
     Raises:

@@ -54,7 +54,7 @@ class Lattice:
             raise ValueError(f"kernel size must be three positive integers, not {size}")
         z, y, x = (torch.arange(k, dtype=dtype) - (k - 1) // 2 for k in size)
         planar = y[:, None] ** 2 + x[None, :] ** 2
-        return cls(tuple(size), z[:, None, None], planar[None])
+        return cls(size, z[:, None, None], planar[None])
 
     @property
     def top(self) -> float:

@@ -225,6 +225,28 @@ def evaluate(
     _answer(result, as_json, _score_lines)
 
 
+@app.command()
+def explain(
+    survey: Annotated[Path, typer.Argument(help="LAS, LAZ or COPC survey, or a TS40K sample.")],
+    model: ModelFile,
+    out: Annotated[Path, typer.Option("--out", help="Page to write (.html).")],
+    as_json: AsJson = False,
+) -> None:
+    """Write a page that says for every tower why it is one."""
+    from dataclasses import asdict
+
+    from scenenet.detection import DetectionSettings
+    from scenenet.inference import PredictSettings
+    from scenenet.report.receipts import explain_survey
+
+    found = explain_survey(survey, model, out, PredictSettings(), DetectionSettings())
+    _answer(
+        [asdict(receipt) for receipt in found],
+        as_json,
+        lambda all_: [f"{out}: the reasons for {len(all_)} towers"],
+    )
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; errors of the input end with their message and code 1."""
     try:

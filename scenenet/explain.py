@@ -1,0 +1,107 @@
+"""Why a tower was called one: who contributed what (thesis 5.2.3, Figure 5.6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from scenenet.geneo import kernel_named
+from scenenet.modelfile import ModelCard
+from scenenet.models import SceneNet, VoxelModel
+
+SILENT = 0.01
+"""A GENEO with a smaller share said nothing that a person would want to read."""
+
+
+@dataclass(frozen=True)
+class Receipt:
+    """The reason for one tower.
+
+    Attributes:
+        id: number in the tower list.
+        x, y: m, in the survey's CRS.
+        height: m above the ground at its foot.
+        probability: of its most certain voxel.
+        contributions: (GENEO, share, sentence), the largest first. Positive shares speak for a
+            tower, negative ones against; their absolute values sum to about one.
+        doubts: what should make a person look again.
+    """
+
+    id: int
+    x: float
+    y: float
+    height: float
+    probability: float
+    contributions: tuple[tuple[str, float, str], ...]
+    doubts: tuple[str, ...]
+
+
+def receipts(geojson: Mapping[str, Any], model: VoxelModel, card: ModelCard) -> list[Receipt]:
+    """A receipt for every tower of a list that ``scenenet.inference`` has written.
+
+    A model without GENEOs gives receipts without contributions: it has no parts with a meaning.
+    """
+    return [_receipt(feature, model, card) for feature in geojson["features"]]
+
+
+def _receipt(feature: Mapping[str, Any], model: VoxelModel, card: ModelCard) -> Receipt:
+    facts = feature["properties"]
+    shares = sorted(facts["contributions"].items(), key=lambda item: -abs(item[1]))
+    doubts = []
+    if facts["edge_distance"] < facts["height"]:
+        doubts.append(
+            f"{facts['edge_distance']:.0f} m from the edge of the data, nearer than it is tall: "
+            "it may be cut off"
+        )
+    if card.tau is not None and facts["probability"] < (1 + card.tau) / 2:
+        doubts.append(f"its probability is not far above tau, {card.tau:.3f}")
+    x, y = feature["geometry"]["coordinates"][:2]
+    return Receipt(
+        facts["id"],
+        x,
+        y,
+        facts["height"],
+        facts["probability"],
+        tuple((name, share, _sentence(name, share, model)) for name, share in shares),
+        tuple(doubts),
+    )
+
+
+def _sentence(name: str, share: float, model: VoxelModel) -> str:
+    if abs(share) < SILENT:
+        return "had next to nothing to say here"
+    side = "speaks for a tower" if share > 0 else "speaks against one"
+    return f"{side}, {abs(share):.0%} of the answer"
+
+
+def meanings(model: VoxelModel, card: ModelCard) -> list[tuple[str, float, str, str]]:
+    """Every number of a SCENE-Net as (name, value, unit, meaning); none for a CNN.
+
+    Lengths are in metres too, at the voxel size that surveys are predicted at.
+    """
+    if not isinstance(model, SceneNet):
+        return []
+    values = model.shape_parameters()
+    rows = []
+    for name, geneo in zip(model.names, model.geneos, strict=True):
+        for parameter in kernel_named(geneo).parameters:
+            value = values[f"{name}.{parameter.name}"]
+            unit = parameter.unit
+            if unit == "voxel":
+                unit = f"voxel = {value * card.voxel_size:.2f} m"
+            rows.append((f"{name} {parameter.name}", value, unit, parameter.meaning))
+    rows += [
+        (f"lambda {name}", values[f"lambda.{name}"], "1", f"weight of the {name} in the answer")
+        for name in model.names
+    ]
+    return rows
+
+
+def read_receipts(geojson: str | Path, model: str | Path) -> list[Receipt]:
+    """Receipts from files."""
+    from scenenet.files import read_json
+    from scenenet.modelfile import read_model
+
+    return receipts(read_json(geojson), *read_model(model))

@@ -67,8 +67,10 @@ def detect_towers(
     from sklearn.cluster import DBSCAN
 
     offset = centres.min(axis=0)
-    # In plan: what stands above one another is one tower, however little lies between.
-    labels = DBSCAN(eps=settings.eps, min_samples=1).fit_predict((centres - offset)[:, :2])
+    # In plan: what stands above one another is one tower, however little lies between. One place a
+    # column, because DBSCAN's memory grows with the pairs of places that are near each other.
+    columns, column_of = np.unique((centres - offset)[:, :2], axis=0, return_inverse=True)
+    labels = DBSCAN(eps=settings.eps, min_samples=1).fit_predict(columns)[column_of.reshape(-1)]
     ground = cKDTree(surroundings[:, :2] - offset[:2])
     towers = []
     for label in range(labels.max() + 1):

@@ -49,7 +49,7 @@ def score(
     """
     tau = card.threshold()
     every, occupied = Confusion(), Confusion()
-    curve: ThresholdCurve | None = None
+    curve = ThresholdCurve.empty()
     towers = TowerMatch(np.empty(0), 0, 0)
     per_sample = []
     pairs = list(zip(dataset.samples, dataset.crops, strict=True))
@@ -58,8 +58,7 @@ def score(
         counts = confusion(probability, truth, tau)
         every += counts
         occupied += confusion(probability[sample.index], truth[sample.index], tau)
-        of_sample = ThresholdCurve.of(probability, truth)
-        curve = of_sample if curve is None else curve + of_sample
+        curve += ThresholdCurve.of(probability, truth)
         match = crop_towers(sample, crop, probability, tau, detection)
         towers += match
         per_sample.append(
@@ -85,8 +84,8 @@ def score(
         "voxel_occupied": occupied.scores() | shared,
         "towers": towers.scores(),
         "per_sample": per_sample,
-        "pr_curve": {} if curve is None else curve_columns(curve),
-        "average_precision": 0.0 if curve is None else curve.average_precision(),
+        "pr_curve": curve_columns(curve),
+        "average_precision": curve.average_precision(),
     }
 
 

@@ -309,7 +309,8 @@ def answer_tile(
             shares = (parts / weight).T.contiguous().numpy()
         else:
             kernel, bias = model.observer()
-            observed = (convolve(occupancy, kernel) + bias)[0][inner].reshape(-1)[tile.voxel]
+            answer = convolve(occupancy, kernel) + (0 if bias is None else bias)
+            observed = answer[0][inner].reshape(-1)[tile.voxel]
             shares = np.empty((len(tile.voxel), 0), np.float32)
         probability = torch.relu(torch.tanh(observed)).numpy()
     return probability, shares

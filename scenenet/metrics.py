@@ -97,13 +97,26 @@ class ThresholdCurve:
     false: np.ndarray
 
     @classmethod
+    def empty(cls) -> ThresholdCurve:
+        """Of no voxels: where a sum begins."""
+        nothing = np.zeros(PROBABILITY_STEPS + 1, np.int64)
+        return cls(nothing, nothing)
+
+    @classmethod
     def of(cls, probability: np.ndarray, tower: np.ndarray) -> ThresholdCurve:
         """From probabilities (V,) and truth (V,) bool; all voxels of the grid must be given."""
-        # float64, and a hair up, so that 0.3 counts for the threshold 0.3 and not for 0.299.
-        bins = np.floor(probability.astype(np.float64) * PROBABILITY_STEPS + 1e-4).astype(np.int64)
-        bins = bins.clip(0, PROBABILITY_STEPS)
+        # Compared in the probabilities' own type, as ``confusion`` does: 0.3 counts for 0.3.
+        taus = (np.arange(1, PROBABILITY_STEPS + 1) / PROBABILITY_STEPS).astype(probability.dtype)
+        # Most voxels are empty and have probability 0; they are counted and not sorted into bins.
+        # What is not a number is no tower either.
+        some = np.flatnonzero(probability > 0)
+        bins, truth = np.searchsorted(taus, probability[some], side="right"), tower[some]
         n = PROBABILITY_STEPS + 1
-        return cls(np.bincount(bins[tower], minlength=n), np.bincount(bins[~tower], minlength=n))
+        true, false = np.bincount(bins[truth], minlength=n), np.bincount(bins[~truth], minlength=n)
+        n_tower = int(np.count_nonzero(tower))
+        true[0] += n_tower - int(true.sum())
+        false[0] += probability.size - n_tower - int(false.sum())
+        return cls(true, false)
 
     def __add__(self, other: ThresholdCurve) -> ThresholdCurve:
         return ThresholdCurve(self.true + other.true, self.false + other.false)

@@ -27,13 +27,15 @@ class VoxelModel(nn.Module):
     kernel_size: KernelSize
 
     @abstractmethod
-    def observer(self) -> tuple[Tensor, Tensor]:
-        """The summed kernel (kz, ky, kx) and the bias ()."""
+    def observer(self) -> tuple[Tensor, Tensor | None]:
+        """The summed kernel (kz, ky, kx) and the bias (), None for a model without."""
 
     def forward(self, occupancy: Occupancy) -> Tensor:
         """Probability of each voxel to hold a tower: (tanh(H(x)))_+, (B, D, H, W) in [0, 1]."""
         kernel, bias = self.observer()
-        return torch.relu(torch.tanh(convolve(occupancy, kernel) + bias))
+        observed = convolve(occupancy, kernel)
+        # A SCENE-Net has no bias, and adding zero to a volume is a pass over it.
+        return torch.relu(torch.tanh(observed if bias is None else observed + bias))
 
     def n_parameters(self) -> int:
         """Number of trained numbers."""
@@ -105,9 +107,8 @@ class SceneNet(VoxelModel):
             ]
         )
 
-    def observer(self) -> tuple[Tensor, Tensor]:
-        mixed = torch.einsum("k,kzyx->zyx", self.mixing_weights(), self.kernels())
-        return mixed, torch.zeros(())
+    def observer(self) -> tuple[Tensor, None]:
+        return torch.einsum("k,kzyx->zyx", self.mixing_weights(), self.kernels()), None
 
     def contributions(self, occupancy: Occupancy) -> Tensor:
         """What each GENEO adds to the observer, (K, B, D, H, W): lambda_k (g_k * x).

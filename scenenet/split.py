@@ -96,25 +96,47 @@ def _stretches(manifest: str | Path, settings: SplitSettings) -> pd.DataFrame:
     crops = crops.iloc[line_order(crops[["x", "y"]].to_numpy(float))].reset_index(drop=True)
     xy, radius = crops[["x", "y"]].to_numpy(float), crops["radius"].to_numpy(float)
     step = np.linalg.norm(np.diff(xy, axis=0), axis=1)
-    beside = np.append(False, step < settings.neighbour)[: len(crops)]
     overlap = np.append(False, step < radius[1:] + radius[:-1])[: len(crops)]
-    names, number, length = [], 0, 0
+    beside = np.append(False, step < settings.neighbour)[: len(crops)] | overlap
+    numbers, number, length = [], -1, 0
     for i in range(len(crops)):
         apart = not beside[i] or (length >= settings.stretch and not overlap[i])
         if i == 0 or apart:
             number, length = number + 1, 0
         length += 1
-        names.append(f"{facts['survey']}-{number:03d}")
+        numbers.append(number)
+    joined = _sharing_ground(np.array(numbers, int), xy, radius)
     return pd.DataFrame(
         {
             "survey": facts["survey"],
             "crop": crops["id"],
-            "stretch": names,
+            "stretch": [f"{facts['survey']}-{number + 1:03d}" for number in joined],
             "x": crops["x"],
             "y": crops["y"],
             "beside_previous": beside,
         }
     )
+
+
+def _sharing_ground(stretch: np.ndarray, xy: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Numbers of the stretches (C,) from 0, where those with overlapping crops have become one.
+
+    A line may come back to where it has been, and lines may cross, so towers that are not
+    consecutive can share ground.
+    """
+    if len(stretch) == 0:
+        return stretch
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(xy).query_pairs(2 * radius.max(), output_type="ndarray")
+    a, b = pairs.T
+    share = np.linalg.norm(xy[a] - xy[b], axis=1) < radius[a] + radius[b]
+    a, b = stretch[a[share]], stretch[b[share]]
+    shape = (stretch.max() + 1,) * 2
+    _, joined = connected_components(coo_array((np.ones(len(a)), (a, b)), shape), directed=False)
+    return joined[stretch]
 
 
 def _draw(stretch: pd.Series, settings: SplitSettings) -> dict[str, str]:

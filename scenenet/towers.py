@@ -81,6 +81,7 @@ def cluster(xyz: np.ndarray, settings: TowerSettings) -> np.ndarray:
     local = xyz - xyz.min(axis=0)
     cells = np.floor(local / settings.cell).astype(np.int64)
     _, cell_of, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
+    cell_of = cell_of.reshape(-1)  # numpy 2.0 gives (N, 1), later ones (N,)
     sums = np.stack([np.bincount(cell_of, weights=axis) for axis in local.T], axis=1)
     centre = sums / count[:, None]
     dbscan = DBSCAN(eps=settings.eps, min_samples=settings.min_points)

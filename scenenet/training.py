@@ -138,8 +138,7 @@ def threshold_curve(
     model: VoxelModel, samples: Sequence[VoxelSample], measurement: Measurement
 ) -> ThresholdCurve:
     """Scores at every tau over all voxels of ``samples``, empty ones included."""
-    n = len(ThresholdCurve.of(np.zeros(0), np.zeros(0, bool)).true)
-    total = ThresholdCurve(np.zeros(n, np.int64), np.zeros(n, np.int64))
+    total = ThresholdCurve.empty()
     for sample in samples:
         total += ThresholdCurve.of(*probabilities(model, sample, measurement))
     return total
@@ -193,16 +192,17 @@ def _validate(
     """Loss and best F0.5 on the validation part; NaN where there is none."""
     if not validation:
         return {"validation_loss": float("nan"), "validation_f05": float("nan")}
+    curve = ThresholdCurve.empty()
     losses, sizes = [], []
-    with torch.no_grad():
-        for sample in validation:
-            occupancy, towers = batch([sample], measurement)
-            losses.append(fidelity(model(occupancy), torch.from_numpy(towers), weights).item())
-            sizes.append(sample.grid.n_voxels)
-    _, best = threshold_curve(model, validation, measurement).best()
+    for sample in validation:
+        probability, truth = probabilities(model, sample, measurement)
+        curve += ThresholdCurve.of(probability, truth)
+        towers = torch.from_numpy(np.flatnonzero(truth))
+        losses.append(fidelity(torch.from_numpy(probability), towers, weights).item())
+        sizes.append(sample.grid.n_voxels)
     return {
         "validation_loss": float(np.average(losses, weights=sizes)),
-        "validation_f05": best.f05,
+        "validation_f05": curve.best()[1].f05,
     }
 
 
@@ -244,13 +244,16 @@ def _resume(
     """Take model, optimiser and history from a checkpoint; an empty history where none fits."""
     if path is None or not path.is_file():
         return []
-    from safetensors import safe_open
+    from safetensors import SafetensorError, safe_open
 
-    with safe_open(path, framework="pt") as stream:
-        metadata = stream.metadata()
-        if metadata["identity"] != identity:
-            return []
-        tensors = {name: stream.get_tensor(name) for name in list(stream.keys())}
+    try:
+        with safe_open(path, framework="pt") as stream:
+            metadata = stream.metadata() or {}
+            if metadata.get("identity") != identity:
+                return []
+            tensors = {name: stream.get_tensor(name) for name in list(stream.keys())}
+    except SafetensorError:  # damaged: the training begins anew, which costs time and no result
+        return []
     model.load_state_dict(
         {k.removeprefix("model/"): v for k, v in tensors.items() if k.startswith("model/")}
     )

@@ -15,6 +15,9 @@ from scenenet.settings import Settings
 
 Fit = Literal["cube", "metric"]
 
+MAX_VOXELS = 2**28
+"""Voxels of the largest grid, 16 times that of 256^3: its probabilities take 1 GiB."""
+
 
 class VoxelSettings(Settings):
     """How a crop becomes a grid."""
@@ -73,10 +76,16 @@ class VoxelGrid:
         """As many voxels of ``voxel_size`` as the points need, centred on their bounding box.
 
         Raises:
-            InputError: there are no points.
+            InputError: there are no points, or they are too far apart.
         """
         low, high = _bounds(xyz)
         counts = np.maximum(1, np.ceil((high - low) / voxel_size)).astype(int)
+        if np.prod(counts.astype(float)) > MAX_VOXELS:
+            extent = " x ".join(f"{side:.0f}" for side in high - low)
+            raise InputError(
+                f"points over {extent} m need more than {MAX_VOXELS} voxels of {voxel_size:g} m",
+                remedy="Remove stray points, or take larger voxels",
+            )
         origin = (low + high - counts * voxel_size) / 2
         return cls(tuple(origin.tolist()), float(voxel_size), tuple(counts[::-1].tolist()))
 

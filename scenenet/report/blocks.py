@@ -1,0 +1,180 @@
+"""What a page is made of: sections of text, facts, tables and pictures; nothing of HTML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from scenenet.figures import Picture
+
+NOTHING = "–"
+"""Stands where there is no number: not measured, not published, or a spread over one seed."""
+
+Format = Literal[
+    "text",
+    "count",
+    "score",
+    "score2",
+    "percent",
+    "share",
+    "metres",
+    "seconds",
+    "number",
+    "plain",
+    "yes",
+]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table on the page.
+
+    Attributes:
+        name: column of the data frame.
+        label: heading, with the unit.
+        format: how its values are written.
+        spread: column with the standard deviation, written behind the value.
+        published: whether the numbers are the thesis'; they are set apart by their look.
+    """
+
+    name: str
+    label: str
+    format: Format = "text"
+    spread: str | None = None
+    published: bool = False
+
+    @property
+    def numeric(self) -> bool:
+        return self.format not in ("text", "yes")
+
+
+@dataclass(frozen=True)
+class Text:
+    text: str
+    kind: str = "text"
+
+
+@dataclass(frozen=True)
+class Notes:
+    """Points to heed, such as the warnings of a check."""
+
+    title: str
+    items: Sequence[str]
+    kind: str = "notes"
+
+
+@dataclass(frozen=True)
+class Facts:
+    """A few numbers that stand for themselves: (label, value) pairs."""
+
+    items: Sequence[tuple[str, str]]
+    kind: str = "facts"
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as it is shown; ``folded`` ones open on demand."""
+
+    caption: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[str]]
+    source: str | None = None
+    folded: bool = False
+    kind: str = "table"
+
+
+@dataclass(frozen=True)
+class Figure:
+    picture: Picture
+    kind: str = "figure"
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A part of a section that the contents list does not name."""
+
+    text: str
+    kind: str = "heading"
+
+
+Block = Text | Notes | Facts | Table | Figure | Heading
+
+
+@dataclass
+class Section:
+    """A part of the page with an entry in the contents."""
+
+    id: str
+    title: str
+    blocks: list[Block] = field(default_factory=list)
+
+
+def table(
+    frame: pd.DataFrame,
+    columns: Sequence[Column],
+    caption: str,
+    source: str | None = None,
+    folded: bool = False,
+) -> Table:
+    """A data frame with chosen columns, written for people.
+
+    Columns that have no value in any row are left out, so that a spread over one seed or a number
+    the thesis does not give leaves no empty column behind.
+    """
+    shown = [column for column in columns if frame[column.name].notna().any()]
+    rows = [[_cell(row, column) for column in shown] for row in frame.to_dict("records")]
+    return Table(caption, shown, rows, source, folded)
+
+
+def write(value: Any, how: Format) -> str:
+    """A value as people read it."""
+    if value is None or (isinstance(value, float) and math.isnan(value)) or str(value) == "<NA>":
+        return NOTHING
+    return _WRITERS[how](value)
+
+
+def _cell(row: Mapping[Any, Any], column: Column) -> str:
+    value = row[column.name]
+    text = write(value, column.format)
+    deviation = row[column.spread] if column.spread else None
+    spread = write(deviation, column.format)
+    if NOTHING in (text, spread):
+        return text
+    if column.format == "number":
+        # As many decimals as the value it belongs to has.
+        spread = f"{deviation:.{0 if abs(value) >= 100 else 2}f}"
+    return f"{text} ± {spread}"
+
+
+def _decimals(value: float) -> int:
+    """As many as a number of this size needs: 2, none from 100 on and for whole numbers."""
+    return 0 if abs(value) >= 100 or value == round(value) else 2
+
+
+def _seconds(value: float) -> str:
+    if value >= 3600:
+        return f"{value / 3600:.1f} h"
+    if value >= 120:
+        return f"{value / 60:.1f} min"
+    return f"{value:.1f} s" if value >= 1 else f"{1000 * value:.3g} ms"
+
+
+_WRITERS: Mapping[str, Callable[[Any], str]] = {
+    "text": str,
+    # A narrow space between thousands, as SI has it: no language reads it as a decimal sign.
+    "count": lambda value: f"{round(value):,}".replace(",", "\u202f"),
+    "score": lambda value: f"{value:.3f}",
+    "score2": lambda value: f"{value:.2f}",
+    "percent": lambda value: f"{value:.3f}" if value else "0",
+    "share": lambda value: f"{value:.1f}",
+    "metres": lambda value: f"{value:.2f}",
+    "seconds": _seconds,
+    "number": lambda value: f"{value:.{_decimals(value)}f}",
+    "plain": lambda value: f"{value:.10g}",
+    "yes": lambda value: "yes" if str(value).lower() in ("true", "1") else "no",
+}

@@ -1,0 +1,93 @@
+"""The page: one file that opens offline, with everything in it."""
+
+from __future__ import annotations
+
+import base64
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenenet.errors import InputError
+from scenenet.files import write_text
+from scenenet.published import Thesis
+from scenenet.report import sections, survey_sections
+from scenenet.report.blocks import Section
+from scenenet.report.sections import Material, SectionMaker
+from scenenet.results import Results
+
+TITLE = "Towers of power lines, found by SCENE-Net"
+HERE = Path(__file__).parent
+
+SECTIONS: Sequence[SectionMaker] = (
+    sections.overview,
+    sections.models,
+    sections.positions,
+    sections.learned,
+    sections.crops,
+    survey_sections.predictions,
+    sections.data,
+    sections.towers,
+    sections.voxels,
+    sections.training,
+    survey_sections.provenance,
+)
+"""In the order of the page. A section that has nothing to show is left out."""
+
+
+def write_report(
+    results: Results, thesis: Thesis, out: str | Path, title: str = TITLE
+) -> list[Section]:
+    """Write the page of a result folder from its tables, pictures and predictions.
+
+    Args:
+        results: the result folder; its ``tables`` and ``figures`` are shown as they are there.
+        thesis: published numbers.
+        out: HTML file to write; needs no other file and no network.
+        title: of the page.
+
+    Returns:
+        the sections that are on the page.
+
+    Raises:
+        InputError: a result is broken, or a picture is missing.
+    """
+    material = Material(results, thesis)
+    made = [section for make in SECTIONS if (section := make(material)) is not None]
+    write_text(out, render(made, title, thesis.source))
+    return made
+
+
+def render(made: Sequence[Section], title: str, source: str) -> str:
+    """Sections as an HTML page."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=FileSystemLoader(HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"data_uri": data_uri, "png_size": png_size}
+    style = Markup((HERE / "style.css").read_text(encoding="utf-8"))
+    page = environment.get_template("page.html")
+    return page.render(title=title, sections=made, style=style, source=source)
+
+
+def data_uri(path: Path) -> str:
+    """A PNG as a ``data:`` address."""
+    return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode("ascii")
+
+
+def png_size(path: Path) -> tuple[int, int]:
+    """Width and height in pixels, so that the page does not jump while pictures are decoded.
+
+    Raises:
+        InputError: the file is not a PNG.
+    """
+    with path.open("rb") as stream:
+        head = stream.read(24)
+    if len(head) < 24 or head[:8] != b"\x89PNG\r\n\x1a\n":
+        raise InputError("is not a PNG picture", file=path, remedy="Delete it and run again")
+    return struct.unpack(">II", head[16:24])

@@ -1,0 +1,283 @@
+"""The tables of thesis chapter 5 from result files, the thesis' numbers beside ours.
+
+Every function returns a data frame for one CSV. A table for which a run has left nothing (TS40K
+samples have no survey to check) keeps its columns and has no rows. Spread is always the sample
+standard deviation over seeds, empty for a single seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenenet.files import atomic
+from scenenet.published import Published, Thesis
+from scenenet.results import Results, SeedResult
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
+TRIVIAL = "nothing detected"
+"""Name of the trivial baseline, a model that never says tower, where others have theirs."""
+
+
+def classes(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """Table 5.1: share of each class in the points of all surveys together.
+
+    ``lowest_percent`` and ``highest_percent`` are the shares in the survey with the fewest and the
+    most. The thesis' share stands beside a class of the EDP scheme; those it lists and our surveys
+    do not have are kept with a share of zero.
+    """
+    import pandas as pd
+
+    columns = ["code", "class", "points", "share_percent", "lowest_percent", "highest_percent",
+               "thesis_percent"]  # fmt: skip
+    counts = results.class_counts()
+    if not counts:
+        return pd.DataFrame(columns=columns)
+    long = pd.concat(counts, names=["survey"]).reset_index("survey")
+    points = long.pivot_table(
+        index=["code", "class"], columns="survey", values="points", aggfunc="sum", fill_value=0
+    )
+    share = 100 * points / points.sum()
+    ours = pd.DataFrame(
+        {
+            "points": points.sum(axis=1),
+            "share_percent": 100 * points.sum(axis=1) / points.to_numpy().sum(),
+            "lowest_percent": share.min(axis=1),
+            "highest_percent": share.max(axis=1),
+        }
+    )
+    published = pd.Series(_published_classes(thesis), dtype=float, name="thesis_percent")
+    published.index = published.index.set_names(["code", "class"])
+    both = ours.join(published, how="outer").reset_index()
+    filled = dict.fromkeys(["points", "share_percent", "lowest_percent", "highest_percent"], 0)
+    return both.fillna(filled).astype({"points": int})[columns]
+
+
+def towers(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """Properties of the labelled towers (thesis 5.1.2), one row per property."""
+    import pandas as pd
+
+    columns = ["property", "unit", "towers", "mean", "std", "lowest", "highest",
+               "thesis_mean", "thesis_lowest", "thesis_highest"]  # fmt: skip
+    tables = [table for table in results.towers().values() if len(table)]
+    if not tables:
+        return pd.DataFrame(columns=columns)
+    every = pd.concat(tables)
+    rows = []
+    for name, unit in (("points", ""), ("width", "m"), ("length", "m"), ("height", "m"),
+                       ("spacing", "m")):  # fmt: skip
+        values = every[name].dropna()
+        ours = (len(values), values.mean(), values.std(), values.min(), values.max())
+        published = [thesis.value(f"towers.{name}", part) for part in ("value", "low", "high")]
+        rows.append((name, unit, *ours, *published))
+    return pd.DataFrame(rows, columns=columns)
+
+
+def voxelisation(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """Time and size of voxelised crops (thesis 5.1.4), one row per grid.
+
+    ``seconds`` is the mean time for one crop, the files not counted.
+    """
+    import pandas as pd
+
+    columns = ["grid", "samples", "seconds", "seconds_std", "occupied_voxels", "tower_voxels",
+               "tower_share_percent", "thesis_seconds"]  # fmt: skip
+    rows = []
+    for grid, manifests in results.voxel_manifests().items():
+        samples = pd.DataFrame([s for m in manifests.values() for s in m["samples"]])
+        if samples.empty:
+            continue
+        occupied, tower = samples["occupied"], samples["tower"]
+        cube_side = grid.removeprefix("cube-")
+        rows.append(
+            (
+                grid,
+                len(samples),
+                samples["seconds"].mean(),
+                samples["seconds"].std(),
+                occupied.mean(),
+                tower.mean(),
+                100 * tower.sum() / occupied.sum(),
+                thesis.value(f"voxelisation.{cube_side}"),
+            )
+        )
+    return pd.DataFrame(rows, columns=columns)
+
+
+def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
+    """One row per model and seed: test scores, tower scores, tau and training time."""
+    import pandas as pd
+
+    columns = ["model", "seed", "alive", "tau", "validation_f05", *SCORES, "average_precision",
+               *(f"tower_{name}" for name in TOWER_SCORES), "epochs",
+               "training_seconds"]  # fmt: skip
+    rows = []
+    for result in results.trained:
+        voxel, tower = result.evaluation["voxel"], result.evaluation["towers"]
+        rows.append(
+            (
+                result.model,
+                result.seed,
+                result.alive,
+                voxel["tau"],
+                result.validation.get("f05"),
+                *(voxel[name] for name in SCORES),
+                result.evaluation.get("average_precision"),
+                *(tower[name] for name in TOWER_SCORES),
+                result.epochs,
+                result.seconds,
+            )
+        )
+    return pd.DataFrame(rows, columns=columns)
+
+
+def models(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """Table 5.3: voxel scores on the test crops, the thesis' beside, and the trivial baseline.
+
+    Up to three rows per model tell which trainings were counted: ``all seeds``, ``live seeds``
+    (those that detect anything; only where some do not) and the one that is best on validation,
+    which is the one that predicts. The thesis counts useful trainings only (5.2.6).
+    """
+    import pandas as pd
+
+    columns = ["model", "counted", "n_seeds", "live_share", "parameters"]
+    columns += [f"{name}{part}" for name in SCORES for part in ("", "_std")]
+    for name in ("precision", "recall", "miou"):
+        columns += [f"thesis_{name}", f"thesis_{name}_std"]
+    rows = []
+    for model, kind in results.models.items():
+        trained = results.of_model(model)
+        for counted, group in _counted(trained, results.champion(model)):
+            row = {
+                "model": model,
+                "counted": counted,
+                "n_seeds": len(group),
+                "live_share": sum(r.alive for r in trained) / len(trained),
+                "parameters": n_parameters(group[0]),
+            }
+            row |= _mean_and_std(group, "voxel", SCORES)
+            row |= _published_scores(thesis, kind)
+            rows.append(row)
+    if results.trained:
+        baseline = _mean_and_std(results.trained, "voxel_trivial", SCORES)
+        scores = {name: baseline[name] for name in SCORES}
+        rows.append({"model": TRIVIAL, "counted": "-", "parameters": 0, **scores})
+    return pd.DataFrame(rows, columns=columns).astype({"n_seeds": "Int64", "parameters": "Int64"})
+
+
+def tower_scores(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
+    """Predicted towers against true ones on the test crops, mean and spread over seeds."""
+    import pandas as pd
+
+    columns = ["model", "counted", "n_seeds"]
+    columns += [f"{name}{part}" for name in TOWER_SCORES for part in ("", "_std")]
+    rows = []
+    for model in results.models:
+        for counted, group in _counted(results.of_model(model), results.champion(model)):
+            row = {"model": model, "counted": counted, "n_seeds": len(group)}
+            rows.append(row | _mean_and_std(group, "towers", TOWER_SCORES))
+    return pd.DataFrame(rows, columns=columns)
+
+
+def times(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """Training time of one seed (thesis 5.2.6), whatever machine this ran on."""
+    import pandas as pd
+
+    columns = ["model", "n_seeds", "epochs", "training_seconds", "training_seconds_std",
+               "seconds_per_epoch", "thesis_training_seconds"]  # fmt: skip
+    minutes = thesis.value("times.training")
+    rows = []
+    for model in results.models:
+        timed = [r for r in results.of_model(model) if r.seconds is not None]
+        if not timed:
+            continue
+        seconds = pd.Series([r.seconds for r in timed], dtype=float)
+        epochs = pd.Series([r.epochs for r in timed], dtype=float)
+        mean_and_std = (seconds.mean(), seconds.std())
+        per_epoch = seconds.sum() / epochs.sum()
+        published = None if minutes is None else 60 * minutes
+        rows.append((model, len(timed), epochs.mean(), *mean_and_std, per_epoch, published))
+    return pd.DataFrame(rows, columns=columns)
+
+
+TOWER_SCORES = ("precision", "recall", "median_error_m", "n_true", "n_predicted")
+
+TABLES: Mapping[str, Callable[[Results, Thesis], pd.DataFrame]] = {
+    "classes": classes,
+    "towers": towers,
+    "voxelisation": voxelisation,
+    "models": models,
+    "seeds": seeds,
+    "tower_scores": tower_scores,
+    "times": times,
+}
+"""Every table by the stem of its file. A new one is added here and the report finds it."""
+
+
+def write_tables(
+    results: Results, thesis: Thesis, out: str | Path, names: Iterable[str] = tuple(TABLES)
+) -> list[Path]:
+    """Write the tables called ``names`` as ``out/NAME.csv``."""
+    paths = []
+    for name in names:
+        path = Path(out) / f"{name}.csv"
+        with atomic(path) as partial:
+            TABLES[name](results, thesis).to_csv(partial, index=False, float_format="%.6g")
+        paths.append(path)
+    return paths
+
+
+def n_parameters(result: SeedResult) -> int | None:
+    """Trained numbers of a model, counted in its file; None where there is no file."""
+    if not result.model_files:
+        return None
+    from scenenet.modelfile import read_model
+
+    model, _ = read_model(result.model_files[0])
+    return model.n_parameters()
+
+
+def _counted(
+    trained: list[SeedResult], champion: SeedResult | None
+) -> Iterable[tuple[str, list[SeedResult]]]:
+    if not trained:
+        return
+    yield "all seeds", trained
+    live = [result for result in trained if result.alive]
+    if 0 < len(live) < len(trained):
+        yield "live seeds", live
+    if champion is not None:
+        yield f"seed {champion.seed}, best on validation", [champion]
+
+
+def _mean_and_std(
+    group: list[SeedResult], part: str, names: Iterable[str]
+) -> dict[str, float | None]:
+    import pandas as pd
+
+    summary: dict[str, float | None] = {}
+    for name in names:
+        values = pd.Series([r.evaluation[part][name] for r in group], dtype=float)
+        summary |= {name: values.mean(), f"{name}_std": values.std()}
+    return summary
+
+
+def _published_scores(thesis: Thesis, kind: str) -> dict[str, float | None]:
+    scores: dict[str, float | None] = {}
+    for name in ("precision", "recall", "miou"):
+        number = thesis.number(f"models.{kind}.{name}") or Published(place="")
+        scores |= {f"thesis_{name}": number.value, f"thesis_{name}_std": number.spread}
+    return scores
+
+
+def _published_classes(thesis: Thesis) -> dict[tuple[int, str], float | None]:
+    """(code, class) of the EDP scheme -> share, %."""
+    return {
+        (int(name.removeprefix("class_share.")), number.what or ""): number.value
+        for name, number in thesis.numbers.items()
+        if name.startswith("class_share.")
+    }

@@ -1,0 +1,15 @@
+"""Every training as a run in MLflow, to be compared side by side."""
+
+from scenenet.tracking.records import model_groups
+from scenenet.tracking.runs import RunGroup, RunRecord, log_runs
+from scenenet.tracking.store import TrackingSettings, create_store, store_id
+
+__all__ = [
+    "RunGroup",
+    "RunRecord",
+    "TrackingSettings",
+    "create_store",
+    "log_runs",
+    "model_groups",
+    "store_id",
+]

@@ -1,0 +1,127 @@
+"""Pictures show what the result files say, and say it in words as well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from matplotlib.image import imread
+
+from scenenet.errors import InputError
+from scenenet.figures import charts, draw_all, plan, read_pictures, scenes
+from scenenet.pointcloud import PointCloud, class_scheme, write_las
+from scenenet.published import Thesis
+from scenenet.results import Results
+
+
+def inked(path: Path) -> float:
+    """Share of pixels that are not white."""
+    return float((imread(path)[..., :3].min(axis=-1) < 0.99).mean())
+
+
+def test_the_plan_names_every_picture_before_anything_has_run(tmp_path: Path):
+    empty = Results(
+        tmp_path, {"scenenet": "scenenet", "cnn": "cnn"}, seeds=[0], predicted=["fresh"]
+    )
+    names = [drawing.name for drawing in plan(empty, sources={"north": ("north.laz", "edp")})]
+    assert names == [
+        "clusters-north", "voxels", "precision-recall",
+        "training-scenenet", "kernels-scenenet", "parameters-scenenet", "paths-scenenet",
+        "training-cnn", "kernels-cnn", "crop-best", "crop-median", "crop-worst",
+        "prediction-fresh",
+    ]  # fmt: skip
+
+
+def test_a_folder_of_single_crops_has_no_map_of_its_towers(results: Results):
+    names = [drawing.name for drawing in plan(results, sources={"ts40k": ("samples", "edp")})]
+    assert "clusters-ts40k" not in names
+
+
+def test_every_planned_picture_is_drawn_and_described(
+    results: Results, thesis: Thesis, tmp_path: Path
+):
+    planned = plan(results, thesis)
+    draw_all(planned, tmp_path / "figures")
+    pictures = read_pictures(tmp_path / "figures", [drawing.name for drawing in planned])
+    assert [p.name for p in pictures] == [d.name for d in planned]
+    for picture in pictures:
+        assert inked(picture.file) > 0.01, picture.name
+        assert len(picture.alt) > 40, picture.name
+        assert len(picture.caption) > 40, picture.name
+
+
+def test_the_same_results_give_the_same_files(results: Results, tmp_path: Path):
+    planned = [d for d in plan(results) if d.name in ("training-scenenet", "crop-best")]
+    draw_all(planned, tmp_path / "a")
+    draw_all(planned, tmp_path / "b")
+    for name in ("training-scenenet.png", "training-scenenet.json", "crop-best.png"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_a_picture_that_went_missing_is_noticed(results: Results, tmp_path: Path):
+    drawing = next(d for d in plan(results) if d.name == "training-cnn")
+    (picture,) = draw_all([drawing], tmp_path)
+    picture.file.unlink()
+    with pytest.raises(InputError, match=r"training-cnn\.png: the picture is missing"):
+        read_pictures(tmp_path, ["training-cnn"])
+
+
+def test_crops_are_chosen_by_the_f05_of_the_seed_that_predicts(results: Results, tmp_path: Path):
+    crops = [d for d in plan(results) if d.section == "crops"]
+    captions = {p.name: p.caption for p in draw_all(crops, tmp_path)}
+    assert "north-0003" in captions["crop-best"]
+    assert "north-0002" in captions["crop-median"]
+    assert "north-0001" in captions["crop-worst"]
+
+
+def test_the_map_of_towers_counts_them_and_the_noise(results: Results, tmp_path: Path):
+    rng = np.random.default_rng(0)
+    at = np.repeat([[0.0, 0, 0], [300, 0, 0], [150, 80, 0]], [400, 400, 5], axis=0)
+    xyz = rng.normal(at, 1.0) + np.array([500_000, 4_600_000, 50])
+    codes = np.full(len(xyz), 15, np.uint8)
+    write_las(tmp_path / "north.laz", PointCloud(xyz, codes, class_scheme("edp")))
+    sources = {"north": (str(tmp_path / "north.laz"), "edp")}
+    drawing = plan(replace(results, models={}, predicted=[]), sources=sources)
+    (picture,) = draw_all(drawing, tmp_path)
+    assert "805 points labelled tower in 2 clusters" in picture.alt
+    assert "5 points belong to none" in picture.alt
+
+
+def test_the_area_below_a_curve_is_precision_times_recall_gained(tmp_path: Path):
+    # Recall 0.2 at precision 1 and 0.4 more at precision 0.5: 0.2 + 0.2.
+    curve = {"precision": [0.5, 1.0, 0.0], "recall": [0.6, 0.2, 0.0]}
+    alt = charts.precision_recall({"scenenet": [curve]}, tmp_path / "curve.png")
+    assert "area of 0.400" in alt
+
+
+def test_a_dead_seed_halves_the_mean_area(tmp_path: Path):
+    live = {"precision": [1.0, 0.0], "recall": [0.4, 0.0]}
+    dead = {"precision": [0.0, 0.0], "recall": [0.0, 0.0]}
+    alt = charts.precision_recall({"cnn": [live, dead]}, tmp_path / "curve.png")
+    assert "area of 0.200 ± 0.283" in alt
+
+
+def test_training_curves_say_where_they_start_and_end(tmp_path: Path):
+    history = pd.DataFrame({"epoch": [1, 2, 3], "loss": [4.0, 2.0, 0.25]})
+    alt = charts.training({"seed 7": history}, tmp_path / "loss.png")
+    assert "seed 7 from 4 to 0.25" in alt
+
+
+def test_kernels_and_parameters_of_any_number_can_be_drawn(tmp_path: Path):
+    weights = {"one": np.zeros((9, 5, 5)), "two": np.ones((4, 6, 6))}
+    charts.kernels(weights, tmp_path / "kernels.png")
+    charts.parameters({"cylinder.r": [1.0]}, tmp_path / "one.png")
+    charts.parameters({"lambda.arrow": [0.2, 0.4], "arrow.r": [1, 2]}, tmp_path / "two.png")
+    for name in ("kernels", "one", "two"):
+        assert inked(tmp_path / f"{name}.png") > 0.01
+
+
+def test_a_survey_is_turned_so_that_its_line_lies_flat(tmp_path: Path):
+    steps = np.linspace(0, 1000, 2000)
+    xyz = np.column_stack([steps * 0.6, steps * 0.8, np.zeros(2000)])
+    alt = scenes.survey_overview(xyz, np.zeros(2000), np.zeros((0, 3)), tmp_path / "survey.png")
+    assert "over 1000 m" in alt
+    assert "0 detected towers" in alt

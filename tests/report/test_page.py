@@ -1,0 +1,187 @@
+"""The report is one page that opens offline and says what the result files say."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from scenenet.errors import InputError
+from scenenet.figures import draw_all, plan
+from scenenet.published import Thesis
+from scenenet.report import write_report
+from scenenet.report.blocks import NOTHING, write
+from scenenet.results import Results
+from scenenet.tables import write_tables
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+VOID = {"meta", "img", "br", "hr", "link"}
+
+
+class Page(HTMLParser):
+    """Elements of a page, and whether every one was closed in order."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+        self.open: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.text += data
+
+    def all(self, tag: str) -> list[dict[str, str | None]]:
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@pytest.fixture
+def page(results: Results, thesis: Thesis, tmp_path: Path) -> Path:
+    write_tables(results, thesis, results.folder / "tables")
+    chosen = ("training-scenenet", "precision-recall", "prediction-fresh")
+    draw_all([d for d in plan(results, thesis) if d.name in chosen], results.folder / "figures")
+    out = tmp_path / "report" / "index.html"
+    write_report(results, thesis, out)
+    return out
+
+
+def read(path: Path) -> Page:
+    return Page(path.read_text(encoding="utf-8"))
+
+
+def test_the_page_is_whole_html(page: Path):
+    assert read(page).open == []
+
+
+def test_the_page_asks_for_nothing_but_itself(page: Path):
+    html = page.read_text(encoding="utf-8")
+    assert not re.search(r"""(src|href)=["'](?!#|data:)""", html)
+    assert "url(" not in html
+    assert "@import" not in html
+
+
+def test_every_picture_is_in_the_page_with_words_for_it(page: Path):
+    images = read(page).all("img")
+    assert len(images) == 3
+    for image in images:
+        assert image["src"].startswith("data:image/png;base64,")
+        assert len(image["alt"]) > 40
+        assert int(image["width"]) > 300
+
+
+def test_the_contents_lead_to_every_section(page: Path):
+    found = read(page)
+    leads = [a["href"] for a in found.all("a") if a["href"] != "#content"]
+    assert leads == ["#" + section["id"] for section in found.all("section")]
+    assert "#predictions" in leads
+
+
+def test_our_scores_stand_beside_those_of_the_thesis(page: Path):
+    text = read(page).text
+    assert "0.70 ± 0.14" in text  # precision of SCENE-Net: 0.8 and 0.6
+    assert "0.68 ± 0.08" in text  # Table 5.3
+    assert "nothing detected" in text
+
+
+def test_towers_of_a_classified_survey_are_listed_with_reasons(page: Path):
+    text = read(page).text
+    for said in ("512000.00", "20.10", "0.930", "negative sphere [%]", "-10.0"):
+        assert said in text
+
+
+def test_what_comes_from_files_cannot_become_markup(page: Path):
+    html = page.read_text(encoding="utf-8")
+    assert "no &lt;CRS&gt; is named" in html
+    assert "<CRS>" not in html
+
+
+def test_provenance_names_config_and_code_of_each_training(page: Path):
+    text = read(page).text
+    assert "train/scenenet/seed-1/provenance.json" in text
+    assert "c0f19" in text
+
+
+def test_the_same_results_give_the_same_page(page: Path, results: Results, thesis: Thesis):
+    before = page.read_bytes()
+    for later in ("report", "mlflow"):
+        (results.folder / later).mkdir()
+        (results.folder / later / "provenance.json").write_text('{"stage": "later"}')
+    write_report(results, thesis, page)
+    assert page.read_bytes() == before
+
+
+def test_sections_without_results_are_left_out(thesis: Thesis, tmp_path: Path):
+    empty = Results(tmp_path, {"scenenet": "scenenet"}, seeds=[0])
+    write_report(empty, thesis, tmp_path / "index.html")
+    sections = [section["id"] for section in read(tmp_path / "index.html").all("section")]
+    assert sections == ["overview", "provenance"]
+    assert "No model has been evaluated" in read(tmp_path / "index.html").text
+
+
+def test_a_survey_without_towers_says_so(page: Path, results: Results, thesis: Thesis):
+    file = results.folder / "predict" / "fresh" / "fresh.towers.geojson"
+    file.write_text('{"type": "FeatureCollection", "features": []}')
+    write_report(results, thesis, page)
+    assert "No tower was found in fresh." in read(page).text
+
+
+def test_a_picture_that_is_none_is_named(page: Path, results: Results, thesis: Thesis):
+    (results.folder / "figures" / "training-scenenet.png").write_text("not a picture")
+    with pytest.raises(InputError, match=r"training-scenenet\.png: is not a PNG"):
+        write_report(results, thesis, page)
+
+
+@pytest.mark.parametrize(
+    ("value", "how", "text"),
+    [
+        (None, "score", NOTHING),
+        (float("nan"), "count", NOTHING),
+        (1234567, "count", "1\u202f234\u202f567"),
+        (0.0164, "seconds", "16.4 ms"),
+        (5100, "seconds", "1.4 h"),
+        (0, "percent", "0"),
+        (44.752, "percent", "44.752"),
+        (34.74, "number", "34.74"),
+        (300.0, "number", "300"),
+        (True, "yes", "yes"),
+    ],
+)
+def test_values_are_written_as_people_read_them(value, how, text):
+    assert write(value, how) == text
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
+def test_a_phone_shows_the_page_without_scrolling_sideways(page: Path, tmp_path: Path):
+    # The frame is as wide as a phone; the page in it says how wide it came out.
+    measure = (
+        "<script>const page = document.documentElement;"
+        "parent.postMessage([page.scrollWidth, page.clientWidth, innerWidth], '*')</script></body>"
+    )
+    inner = page.read_text(encoding="utf-8").replace("</body>", measure)
+    (tmp_path / "inner.html").write_text(inner, encoding="utf-8")
+    outer = tmp_path / "outer.html"
+    outer.write_text(
+        "<body><script>addEventListener('message', e => document.body.dataset.widths = e.data)"
+        "</script><iframe src='inner.html' style='width:390px;height:800px;border:0'></iframe>"
+    )
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
+               "--disable-background-networking", "--disable-component-update", "--disable-sync",
+               f"--user-data-dir={tmp_path / 'browser'}", "--virtual-time-budget=5000",
+               "--dump-dom", outer.as_uri()]  # fmt: skip
+    dom = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    widths = re.search(r'data-widths="(\d+),(\d+),(\d+)"', dom)
+    assert widths, dom[-2000:]
+    content, room, screen = map(int, widths.groups())
+    assert (content, screen) == (room, 390)

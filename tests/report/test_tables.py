@@ -1,0 +1,149 @@
+"""Tables hold the numbers of the result files, and the thesis' beside them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from scenenet import tables
+from scenenet.errors import InputError
+from scenenet.published import Thesis, read_thesis
+from scenenet.results import Results
+
+
+def row(frame: pd.DataFrame, **where) -> pd.Series:
+    for name, value in where.items():
+        frame = frame[frame[name] == value]
+    assert len(frame) == 1
+    return frame.iloc[0]
+
+
+def test_class_shares_are_those_of_all_points_with_table_5_1_beside(
+    results: Results, thesis: Thesis
+):
+    found = tables.classes(results, thesis)
+    tower = row(found, code=15)
+    assert tower["share_percent"] == pytest.approx(10.0)
+    assert tower["thesis_percent"] == pytest.approx(0.519)
+    assert found["share_percent"].sum() == pytest.approx(100)
+    assert found["thesis_percent"].sum() == pytest.approx(100, abs=0.01)
+    assert list(found["code"]) == list(range(22))
+
+
+def test_class_shares_of_two_surveys_are_weighted_by_their_points(results: Results, thesis: Thesis):
+    south = results.folder / "check" / "south" / "classes.csv"
+    south.parent.mkdir()
+    south.write_text("code,class,points,share_percent\n15,Power line support tower,10000,100\n")
+    both = replace(results, surveys=["north", "south"])
+    tower = row(tables.classes(both, thesis), code=15)
+    assert tower["share_percent"] == pytest.approx(100 * 11_000 / 20_000)
+    assert (tower["lowest_percent"], tower["highest_percent"]) == pytest.approx((10, 100))
+
+
+def test_tower_properties_leave_out_the_missing_last_spacing(results: Results, thesis: Thesis):
+    found = tables.towers(results, thesis)
+    spacing = row(found, property="spacing")
+    assert (spacing["towers"], spacing["mean"]) == (2, 300)
+    height = row(found, property="height")
+    assert (height["mean"], height["lowest"], height["highest"]) == (30, 20, 40)
+    assert (height["thesis_mean"], height["thesis_lowest"]) == (34.74, 18)
+
+
+def test_voxelisation_time_is_the_mean_over_crops(results: Results, thesis: Thesis):
+    found = row(tables.voxelisation(results, thesis), grid="cube-64")
+    assert found["seconds"] == pytest.approx(0.2)
+    assert found["thesis_seconds"] == 0.45
+    assert found["tower_share_percent"] == pytest.approx(2.5)
+
+
+def test_models_have_mean_and_spread_over_seeds(results: Results, thesis: Thesis):
+    found = row(tables.models(results, thesis), model="scenenet", counted="all seeds")
+    assert found["precision"] == pytest.approx(0.7)
+    assert found["precision_std"] == pytest.approx(0.1 * math.sqrt(2))
+    assert (found["parameters"], found["live_share"], found["n_seeds"]) == (11, 1, 2)
+    assert (found["thesis_precision"], found["thesis_precision_std"]) == (0.68, 0.08)
+
+
+def test_dead_seeds_count_and_the_live_ones_are_told_apart(results: Results, thesis: Thesis):
+    found = tables.models(results, thesis)
+    every = row(found, model="cnn", counted="all seeds")
+    live = row(found, model="cnn", counted="live seeds")
+    assert every["precision"] == pytest.approx(0.2)
+    assert every["live_share"] == 0.5
+    assert live["precision"] == pytest.approx(0.4)
+    assert (live["n_seeds"], every["parameters"]) == (1, 2190)
+    assert math.isnan(live["precision_std"])
+    assert "live seeds" not in set(found.loc[found["model"] == "scenenet", "counted"])
+
+
+def test_the_trivial_baseline_has_a_row_of_its_own(results: Results, thesis: Thesis):
+    trivial = row(tables.models(results, thesis), model=tables.TRIVIAL)
+    assert trivial["miou"] == pytest.approx(0.499)
+    assert trivial["precision"] == 0
+
+
+def test_the_seed_that_predicts_is_the_best_on_validation(results: Results, thesis: Thesis):
+    found = tables.models(results, thesis)
+    best = found[found["counted"].str.contains("best on validation")]
+    assert list(best["counted"]) == ["seed 0, best on validation"] * 2
+    assert best.iloc[0]["precision"] == pytest.approx(0.8)
+
+
+def test_seeds_stand_one_by_one(results: Results, thesis: Thesis):
+    found = tables.seeds(results, thesis)
+    assert len(found) == 4
+    dead = row(found, model="cnn", seed=1)
+    assert not dead["alive"]
+    assert (dead["epochs"], dead["training_seconds"]) == (4, 8)
+
+
+def test_position_errors_are_those_of_seeds_that_hit_something(results: Results, thesis: Thesis):
+    found = row(tables.tower_scores(results, thesis), model="cnn", counted="all seeds")
+    assert found["median_error_m"] == 1.5
+
+
+def test_training_time_is_the_sum_of_the_epochs(results: Results, thesis: Thesis):
+    found = row(tables.times(results, thesis), model="scenenet")
+    assert (found["training_seconds"], found["seconds_per_epoch"]) == (8, 2)
+    assert found["thesis_training_seconds"] == 85 * 60
+
+
+def test_every_table_is_written_and_reads_back(results: Results, thesis: Thesis, tmp_path: Path):
+    paths = tables.write_tables(results, thesis, tmp_path / "tables")
+    assert {path.stem for path in paths} == set(tables.TABLES)
+    for path in paths:
+        assert len(pd.read_csv(path)) > 0, path.name
+
+
+def test_stages_that_did_not_run_leave_columns_without_rows(thesis: Thesis, tmp_path: Path):
+    empty = Results(tmp_path, models={"scenenet": "scenenet"}, seeds=[0], surveys=["north"])
+    for path in tables.write_tables(empty, thesis, tmp_path / "tables"):
+        read = pd.read_csv(path)
+        assert len(read) == 0
+        assert len(read.columns) > 3
+
+
+def test_a_broken_result_is_named(results: Results, thesis: Thesis):
+    broken = results.folder / "evaluate" / "cnn" / "seed-0.json"
+    broken.write_text("{")
+    with pytest.raises(InputError, match=r"evaluate/cnn/seed-0\.json: is not JSON"):
+        tables.seeds(results, thesis)
+
+
+def test_published_numbers_have_a_place_and_a_value_or_a_bound(thesis: Thesis):
+    assert len(thesis.numbers) > 90
+    for name, number in thesis.numbers.items():
+        known = (number.value, number.low, number.high)
+        assert number.place, name
+        assert any(part is not None for part in known), name
+
+
+def test_a_misspelt_published_number_is_named(tmp_path: Path):
+    file = tmp_path / "thesis.yaml"
+    file.write_text("source: s\nnumbers:\n  a.b: {valu: 1, place: p}\n")
+    with pytest.raises(InputError, match=r"numbers\.a\.b\.valu"):
+        read_thesis(file)

@@ -23,7 +23,7 @@ def edge_distance(place: np.ndarray, ground: np.ndarray) -> float:
     from scipy.ndimage import binary_closing, distance_transform_edt
 
     half = int(np.ceil(LOOK_M / CELL_M)) + 1
-    cells = np.floor((ground - place) / CELL_M).astype(int) + half
+    cells = np.rint((ground - place) / CELL_M).astype(int) + half  # the place amid its cell
     inside = ((cells >= 0) & (cells < 2 * half)).all(axis=1)
     covered = np.zeros((2 * half, 2 * half), bool)
     covered[tuple(cells[inside].T)] = True
@@ -33,5 +33,6 @@ def edge_distance(place: np.ndarray, ground: np.ndarray) -> float:
     closed = padded[margin:-margin, margin:-margin]
     if closed.all():
         return LOOK_M
-    distance = distance_transform_edt(closed)[half, half] * CELL_M
-    return float(min(distance, LOOK_M))
+    # From the middle of a cell to that of the nearest uncovered one, less the half that lies there.
+    distance = (distance_transform_edt(closed)[half, half] - 0.5) * CELL_M
+    return float(min(max(distance, 0.0), LOOK_M))

@@ -16,9 +16,15 @@ class DetectionSettings(Settings):
     eps: float = Field(
         6.0, gt=0, description="m, planar; detected voxels nearer than this are one tower"
     )
-    min_voxels: int = Field(3, ge=1, description="detected voxels that a tower must have")
+    min_voxels: int = Field(5, ge=1, description="detected voxels that a tower must have")
     min_height: float = Field(
         9.0, ge=0, description="m; thesis 5.1.2 has towers from 18 m, wooden poles begin at 9 m"
+    )
+    min_body: float = Field(
+        8.0,
+        ge=0,
+        description="m from the lowest to the highest detected voxel: a tower is detected along "
+        "its body, a treetop or a roof at one place",
     )
     foot_radius: float = Field(
         5.0, gt=0, description="m, around the tower, where the ground at its foot is looked for"
@@ -75,7 +81,8 @@ def detect_towers(
     towers = []
     for label in range(labels.max() + 1):
         voxels = np.flatnonzero(labels == label)
-        if len(voxels) < settings.min_voxels:
+        body = float(np.ptp(centres[voxels, 2])) + voxel_size
+        if len(voxels) < settings.min_voxels or body < settings.min_body:
             continue
         x, y = np.average(centres[voxels, :2], axis=0, weights=probability[voxels])
         near = ground.query_ball_point([x - offset[0], y - offset[1]], settings.foot_radius)

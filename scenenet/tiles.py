@@ -155,9 +155,9 @@ def code_of(place: tuple[int, int, int]) -> int:
 def groups(codes: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
     """Each code in (n,) with the rows that have it."""
     order = np.argsort(codes, kind="stable")
-    starts = np.flatnonzero(np.diff(codes[order], prepend=np.iinfo(np.int64).min))
-    for start, end in zip(starts, np.append(starts[1:], len(codes)), strict=True):
-        yield int(codes[order[start]]), order[start:end]
+    borders = np.flatnonzero(np.diff(codes[order])) + 1
+    for rows in np.split(order, borders) if len(order) else []:
+        yield int(codes[rows[0]]), rows
 
 
 def _encode(places: np.ndarray) -> np.ndarray:

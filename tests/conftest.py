@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import hypothesis
@@ -122,3 +123,39 @@ def real_samples(real_data: Path):
         cloud = read(path, "edp")
         samples[path.stem] = voxelise(cloud, VoxelGrid.cube(cloud.xyz, 64), path.stem)
     return samples
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Files of a survey on its way to training: paths of the survey, manifests and split."""
+
+    survey: Path
+    crops: Path
+    voxels: Path
+    split: Path
+
+
+@pytest.fixture(scope="session")
+def chain(scene, tmp_path_factory: pytest.TempPathFactory) -> Chain:
+    """A survey of six poles 60 m apart, cut, voxelised at 1 m and split 2 / 1 / 3."""
+    import pandas as pd
+
+    from scenenet.crops import CropSettings, cut_crops
+    from scenenet.pointcloud import write_las
+    from scenenet.towers import TowerSettings, survey_towers
+    from scenenet.voxel_store import build
+    from scenenet.voxels import VoxelSettings
+
+    folder = tmp_path_factory.mktemp("chain")
+    files = Chain(*(folder / n for n in ("s.laz", "crops.json", "voxels.json", "split.csv")))
+    poles = [(20.5 + 60 * i, 20.5) for i in range(6)]
+    write_las(files.survey, scene(poles, size=(345.0, 40.0), tree=(30.0, 30.0)))
+    towers = survey_towers(files.survey, "edp", TowerSettings(min_points=100))
+    store = folder / "crops.zarr.zip"
+    cut_crops("s", files.survey, "edp", towers, CropSettings(), store, files.crops)
+    settings = VoxelSettings(fit="metric", voxel_size=1.0)
+    build(files.crops, settings, folder / "voxels.zarr.zip", files.voxels)
+    parts = ["train", "train", "validation", "test", "test", "test"]
+    crops = [f"s-{number:04d}" for number in towers["tower"]]
+    pd.DataFrame({"survey": "s", "crop": crops, "part": parts}).to_csv(files.split, index=False)
+    return files

@@ -31,6 +31,7 @@ class Codes(StrEnum):
 
     edp = "edp"
     asprs = "asprs"
+    ts40k = "ts40k"
 
 
 class Fit(StrEnum):

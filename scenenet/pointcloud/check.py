@@ -9,25 +9,26 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from pydantic import Field
 
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.crs import CrsRecord, read_crs
-from scenenet.pointcloud.header import LasHeader, read_header
+from scenenet.pointcloud.header import read_header
 from scenenet.pointcloud.kinds import kind_of
-from scenenet.pointcloud.las import class_codes, coordinates, integers_of, iter_records
+from scenenet.pointcloud.las import class_codes, coordinates, iter_records
 from scenenet.pointcloud.report import SurveyReport, class_table, find_warnings
 from scenenet.pointcloud.schemes import class_scheme
 from scenenet.pointcloud.survey import iter_chunks, survey_info
 from scenenet.pointcloud.tally import CellCounts, DuplicateCount
 from scenenet.settings import Settings
 
+if TYPE_CHECKING:
+    import laspy
+
 METRES_IN_A_DEGREE = 111_320.0
-GPS_TIME_BYTE = {1: 20, 3: 20, 4: 20, 5: 20, 6: 22, 7: 22, 8: 22, 9: 22, 10: 22}
-"""Byte of the GPS time in a point record, by point format; formats 0 and 2 have none."""
 
 
 class CheckSettings(Settings):
@@ -110,7 +111,7 @@ def check_survey(
     scheme = None if codes is None else class_scheme(codes)
     info = survey_info(path)
     header = read_header(path) if kind_of(path) == "las" else None
-    told = CrsRecord(info.crs, None, None) if header is None else read_crs(header)
+    told = CrsRecord(None, None) if header is None else read_crs(header.las)
     degrees = _in_degrees(told, info.mins, info.maxs, info.scales)
     unit = told.unit_m or 1.0
     cell = settings.density_cell / (METRES_IN_A_DEGREE if degrees else unit)
@@ -127,7 +128,7 @@ def check_survey(
             _add_cloud(tally, cloud)
     else:
         for records in iter_records(header, settings.chunk_points):
-            _add_records(tally, header, records)
+            _add_records(tally, header.las, records)
     return _report(info, told, degrees, unit, tally, scheme, settings)
 
 
@@ -137,24 +138,21 @@ def _add_cloud(tally: Tally, cloud: PointCloud) -> None:
     tally.duplicates.add((cloud.xyz + 0.0).view(np.uint64))
 
 
-def _add_records(tally: Tally, header: LasHeader, records: np.ndarray) -> None:
-    xyz = coordinates(header, records)
-    _add(tally, xyz, class_codes(header, records))
-    tally.duplicates.add(integers_of(records).astype(np.int64).view(np.uint64))
+def _add_records(
+    tally: Tally, header: laspy.LasHeader, records: laspy.ScaleAwarePointRecord
+) -> None:
+    xyz = coordinates(records)
+    _add(tally, xyz, class_codes(records))
+    places = np.column_stack([records[axis] for axis in "XYZ"])
+    tally.duplicates.add(places.astype(np.int64).view(np.uint64))
     margin = np.abs(header.scales)
     inside = (xyz >= header.mins - margin) & (xyz <= header.maxs + margin)
     tally.outside += int((~inside.all(axis=1)).sum())
-    at = GPS_TIME_BYTE.get(header.point_format)
-    if at is not None:
-        times = np.ascontiguousarray(records[:, at : at + 8]).view("<f8")
-        tally.bad_time += int((~np.isfinite(times)).sum())
-    if header.point_format < 6:  # three bits each, and flags in the upper bits of the class byte
-        number, total = records[:, 14] & 0x07, (records[:, 14] >> 3) & 0x07
-        withheld = records[:, 15] & 0x80
-    else:
-        number, total = records[:, 14] & 0x0F, records[:, 14] >> 4
-        withheld = records[:, 15] & 0x04
-    tally.withheld += int(np.count_nonzero(withheld))
+    if "gps_time" in header.point_format.dimension_names:
+        tally.bad_time += int((~np.isfinite(records["gps_time"])).sum())
+    number = np.asarray(records["return_number"])
+    total = np.asarray(records["number_of_returns"])
+    tally.withheld += int(np.count_nonzero(records["withheld"]))
     tally.bad_returns += int(((number == 0) | (number > total)).sum())
     tally.has_returns |= bool((number | total).any())
 

@@ -1,13 +1,13 @@
-"""The worker that decompresses LAZ points, in a process of its own.
+"""The worker that decompresses LAZ points, in a process of its own, with laspy.
 
 A damaged file can make a LAZ decoder loop for ever, panic, abort its process or ask for all the
 memory there is. Here that ends this process and nothing else: the parent
 (``scenenet.pointcloud.isolation``) sees it and names the file.
 
-It is started with one argument, a JSON object (see ``isolation.Job``), and answers on stdout with
+It is started with one argument, a JSON object (see ``isolation._job``), and answers on stdout with
 frames: a kind (one byte), a number (4 bytes), and what they announce.
 
-- ``P`` n: n points. Either n int32 of X, of Y, of Z and n uint8 class bytes, or n whole records.
+- ``P`` n: n whole point records.
 - ``E`` n: n bytes of text: what the decoder did not like.
 - ``D`` 0: all points were sent.
 
@@ -22,16 +22,30 @@ import resource
 import signal
 import struct
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+if TYPE_CHECKING:
+    import laspy
 
 FRAME = struct.Struct("<cI")
 WATCHDOG_FACTOR = 3
 """The parent stops a worker that stalls. Where the parent is gone, the worker's own alarm does, a
 little later: a signal with its default action, so it works inside a decoder that never comes back
 to Python."""
-PARALLEL_CHUNK_LIMIT = 4_000_000
-"""Points in a chunk above which chunks are not decoded side by side: that holds whole chunks."""
+SLOW_IMPORTS = ("pyproj", "requests")
+"""What laspy imports where it is there and the worker has no use for: half of its start."""
+
+
+def open_points(job: Mapping[str, Any]) -> laspy.LasReader:
+    """laspy's reader of the points of ``job``."""
+    import laspy
+
+    fields = laspy.DecompressionSelection.all()
+    if job["places_only"]:  # layered files keep each field apart: the others are skipped
+        fields = laspy.DecompressionSelection.base().decompress_z().decompress_classification()
+    return laspy.open(job["path"], read_evlrs=False, decompression_selection=fields)
 
 
 def limit_memory(max_bytes: int) -> None:
@@ -46,54 +60,26 @@ def limit_memory(max_bytes: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
 
 
-def open_decompressor(stream: BinaryIO, job: dict[str, Any]):
-    import lazrs
+def send_points(job: Mapping[str, Any], out: BinaryIO) -> None:
+    """Decompress piece by piece and send each piece as soon as it is there.
 
-    mask = lazrs.SELECTIVE_DECOMPRESS_ALL
-    if not job["whole_records"]:  # layered files keep each field apart: the others are skipped
-        mask = (
-            lazrs.SELECTIVE_DECOMPRESS_XY_RETURNS_CHANNEL
-            | lazrs.SELECTIVE_DECOMPRESS_Z
-            | lazrs.SELECTIVE_DECOMPRESS_CLASSIFICATION
-        )
-    selection = lazrs.DecompressionSelection(mask)
-    parallel = job["chunked"] and (
-        job["variable_chunks"] or job["chunk_size"] <= PARALLEL_CHUNK_LIMIT
-    )
-    kind = lazrs.ParLasZipDecompressor if parallel else lazrs.LasZipDecompressor
-    return kind(stream, bytes.fromhex(job["laszip"]), selection)
-
-
-def send_points(job: dict[str, Any], out: BinaryIO) -> None:
-    """Decompress piece by piece and send each piece as soon as it is there."""
+    No piece crosses the border of two chunks of ``job["chunk"]`` points.
+    """
     import numpy as np
 
-    length, at, total = job["record_length"], job["class_byte"], job["n_points"]
-    record = np.dtype({
-        "names": ["X", "Y", "Z", "c"],
-        "formats": ["<i4", "<i4", "<i4", "u1"],
-        "offsets": [0, 4, 8, at],
-        "itemsize": length,
-    })  # fmt: skip
-    with Path(job["path"]).open("rb") as stream:
-        stream.seek(job["offset"])
-        signal.alarm(job["watchdog_s"])
-        decompressor = open_decompressor(stream, job)
-        buffer = bytearray(length * min(job["piece"], total))
+    signal.alarm(job["watchdog_s"])
+    with open_points(job) as reader:
+        total = reader.header.point_count
         done = 0
         while done < total:
-            n = min(job["piece"], total - done)
-            view = memoryview(buffer)[: n * length]
+            n = min(job["piece"], job["chunk"] - done % job["chunk"], total - done)
             signal.alarm(job["watchdog_s"])
-            decompressor.decompress_many(view)
+            points = reader.read_points(n)
             signal.alarm(0)  # the parent may take its time with what it gets
+            if len(points) != n:
+                raise ValueError(f"{len(points)} points where {n} should be")
             out.write(FRAME.pack(b"P", n))
-            if job["whole_records"]:
-                out.write(view)
-            else:
-                points = np.frombuffer(view, record)
-                for name in ("X", "Y", "Z", "c"):
-                    out.write(np.ascontiguousarray(points[name]).data)
+            out.write(np.frombuffer(points.array, np.uint8).data)
             out.flush()
             done += n
     out.write(FRAME.pack(b"D", 0))
@@ -108,6 +94,8 @@ def main() -> int:
     out = os.fdopen(os.dup(1), "wb", buffering=1 << 16)
     os.dup2(2, 1)  # what a library prints must not get between the frames
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    for name in SLOW_IMPORTS:
+        sys.modules[name] = None  # type: ignore[assignment]  # as if it were not installed
     limit_memory(job["max_bytes"])
     try:
         send_points(job, out)

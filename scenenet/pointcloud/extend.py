@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-import struct
+import copy
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from scenenet.errors import InputError
-from scenenet.files import atomic
-from scenenet.pointcloud.compression import LASZIP_RECORD, LASZIP_USER
-from scenenet.pointcloud.extra import RECORD_ID as EXTRA_RECORD
-from scenenet.pointcloud.extra import USER as EXTRA_USER
-from scenenet.pointcloud.extra import ExtraDimension, extra_dimensions
-from scenenet.pointcloud.header import COMPRESSED_BIT, EVLR_HEAD, LasHeader, read_header
+from scenenet.pointcloud.dimensions import OWN_MARK, Dimension, checked, new_dimensions
+from scenenet.pointcloud.header import CheckedHeader, read_header
 from scenenet.pointcloud.kinds import kind_of
 from scenenet.pointcloud.las import coordinates, iter_records
-from scenenet.pointcloud.records import (
-    Dimension,
-    Dimensions,
-    PointSink,
-    checked,
-    extra_vlrs,
-    is_compressed,
-    laszip_vlr,
-    new_dimensions,
-)
 from scenenet.pointcloud.survey import read
-from scenenet.pointcloud.write import write_cloud
+from scenenet.pointcloud.write import NO_DATE, open_writer, write_cloud
+
+if TYPE_CHECKING:
+    import laspy
 
 CHUNK_POINTS = 500_000
+REWRITTEN = {("LASF_Spec", 4), ("laszip encoded", 22204)}
+"""Records that laspy writes anew: the description of extra bytes, and of the compression."""
+PLAIN_BYTES = 7
+"""Bytes that nothing describes come back as dimensions of so many: laspy takes the number of more
+for something else (a scale), and cannot read what it wrote."""
+MIXED_UP_FORMATS = (9, 10)
+"""Formats whose waveform packets lazrs mixes up where a survey has several scanner channels (seen
+with 0.8.2: what it reads back is not what it was given)."""
+MAX_RECORD, MAX_EXTRA = 0xFFFF, 0xFFFF // 192
+"""Most bytes of a point, and most extra dimensions: each has 192 bytes in a record of as many."""
 Values = Callable[[np.ndarray], Mapping[str, np.ndarray]]
 """(n, 3) coordinates -> (n,) numbers by name."""
 
@@ -41,10 +40,10 @@ def add_dimensions(
 ) -> int:
     """Write a survey back with every point and everything it had, and dimensions added.
 
-    Points keep their order, stored integers, scale and offset; header, variable length records,
-    CRS, waveform data and all other dimensions are copied as bytes and not interpreted.
-    Dimensions that an earlier call added (their description says ``scenenet``) are replaced.
-    Memory is bounded by a chunk. A COPC survey comes back as plain LAZ, in the order of its file.
+    Points keep their order, stored integers, scale and offset and all other dimensions; variable
+    length records and CRS are copied. Dimensions that an earlier call added (their description
+    says ``scenenet``) are replaced. Memory is bounded by a chunk. A COPC survey comes back as plain
+    LAZ, in the order of its file.
 
     Args:
         source: the survey: LAS, LAZ, COPC, or a .npy / .pt sample (written as ``write_las`` does).
@@ -57,7 +56,8 @@ def add_dimensions(
         the number of points.
 
     Raises:
-        InputError: the survey cannot be read, or has a dimension of such a name from someone else.
+        InputError: the survey cannot be read, has a dimension of such a name from someone else,
+            waveforms that could not be kept, or no room for more dimensions.
         ValueError: ``values`` did not return what ``names`` promises.
     """
     source, target = Path(source), Path(target)
@@ -68,126 +68,134 @@ def add_dimensions(
         write_cloud(target, cloud, dimensions, arrays, 0.001)
         return len(cloud)
     header = read_header(source)
-    kept = tuple(d for d in extra_dimensions(header) if not d.is_own)
-    for name in {d.name for d in kept} & {d.name for d, _ in dimensions.values()}:
+    channels: set[int] = set()
+    with open_writer(target, _extended(header, dimensions)) as writer:
+        for records in iter_records(header, CHUNK_POINTS):
+            if writer.header.point_format.id in MIXED_UP_FORMATS:
+                channels.update(np.unique(records["scanner_channel"]).tolist())
+                _check_channels(source, channels, writer.header.are_points_compressed)
+            arrays = checked(values(coordinates(records)), dimensions, len(records))
+            writer.write_points(_widened(records, writer.header, arrays))
+        if header.las.evlrs:
+            kept = [e for e in header.las.evlrs if not _is_octree(header, e.user_id)]
+            writer.write_evlrs(type(header.las.evlrs)(kept))
+    return header.las.point_count
+
+
+def _widened(
+    records: laspy.ScaleAwarePointRecord,
+    header: laspy.LasHeader,
+    arrays: Mapping[str, np.ndarray],
+) -> laspy.ScaleAwarePointRecord:
+    """``records`` as points of ``header``: their bytes, then the new dimensions."""
+    import laspy
+
+    points = laspy.ScaleAwarePointRecord.zeros(len(records), header=header)
+    old, new = (r.array.view(np.uint8).reshape(len(r), -1) for r in (records, points))
+    kept = np.ones(old.shape[1], bool)
+    for dimension in filter(_is_own, records.point_format.extra_dimensions):
+        dtype, at = records.array.dtype.fields[dimension.name][:2]
+        kept[at : at + dtype.itemsize] = False
+    new[:, : kept.sum()] = old if kept.all() else old[:, kept]
+    for name, values in arrays.items():
+        points.array[name] = values
+    return points
+
+
+def _extended(header: CheckedHeader, dimensions: list[laspy.ExtraBytesParams]) -> laspy.LasHeader:
+    """The header of the new file: that of the survey with the new dimensions."""
+    import laspy
+
+    _check_can_be_kept(header, {d.name for d in dimensions})
+    new = copy.deepcopy(header.las)
+    entries = {
+        entry.format_name(): entry
+        for record in new.vlrs.get("ExtraBytesVlr")
+        for entry in record.extra_bytes_structs
+    }
+    for dimension in list(new.point_format.extra_dimensions):
+        if _is_own(dimension):
+            new.remove_extra_dim(dimension.name)
+        elif dimension.name not in entries and dimension.num_elements > PLAIN_BYTES:
+            new.remove_extra_dim(dimension.name)
+            sizes = [PLAIN_BYTES] * (dimension.num_elements // PLAIN_BYTES)
+            sizes += [rest] if (rest := dimension.num_elements % PLAIN_BYTES) else []
+            new.add_extra_dims([
+                laspy.ExtraBytesParams(f"{dimension.name}{i}", f"{size}u1", dimension.description)
+                for i, size in enumerate(sizes, 1)
+            ])  # fmt: skip
+    new.add_extra_dims(dimensions)
+    n_extra = len(list(new.point_format.extra_dimensions))
+    if new.point_format.size > MAX_RECORD or n_extra > MAX_EXTRA:
         raise InputError(
-            f"the survey already has a dimension {name!r} that scenenet did not write",
-            file=source,
-            remedy="Rename or remove it first (pdal translate --writers.las.extra_dims)",
+            f"a point would have {new.point_format.size} bytes and {n_extra} extra dimensions, "
+            f"but LAS has room for {MAX_RECORD} and {MAX_EXTRA}",
+            file=header.path,
+            remedy="Remove extra dimensions first (pdal translate --writers.las.extra_dims)",
         )
-    with atomic(target) as partial, partial.open("w+b") as out:
-        _copy(header, out, kept, dimensions, values, is_compressed(target))
-    return header.n_points
-
-
-def _copy(
-    header: LasHeader,
-    out: BinaryIO,
-    kept: tuple[ExtraDimension, ...],
-    dimensions: Dimensions,
-    values: Values,
-    compress: bool,
-) -> None:
-    keep = _kept_bytes(header)
-    length = len(keep) + sum(dtype.itemsize for _, dtype in dimensions.values())
-    entries = b"".join(d.entry for d in (*kept, *(d for d, _ in dimensions.values())))
-    vlrs = _vlrs(header, entries)
-    base = header.record_length - header.n_extra_bytes
-    sink = PointSink(out, header.point_format, length - base, compress)
-    _write_preamble(header, out, vlrs, sink.record, length)
-    sink.start()
-    for records in iter_records(header, CHUNK_POINTS):
-        arrays = checked(values(coordinates(header, records)), dimensions, len(records))
-        widened = np.empty((len(records), length), np.uint8)
-        widened[:, : len(keep)] = records if len(keep) == records.shape[1] else records[:, keep]
-        at = len(keep)
-        for name, (_, dtype) in dimensions.items():
-            end = at + dtype.itemsize
-            widened[:, at:end] = arrays[name].view(np.uint8).reshape(len(records), -1)
-            at = end
-        sink.write(widened)
-    sink.finish()
-    _copy_evlrs(header, out)
-
-
-def _kept_bytes(header: LasHeader) -> np.ndarray:
-    """Positions of the bytes of a record that stay: all but earlier additions of this package."""
-    at = header.record_length - header.n_extra_bytes
-    keep = [np.arange(at)]
-    for dimension in extra_dimensions(header):
-        if not dimension.is_own:
-            keep.append(np.arange(at, at + dimension.size))
-        at += dimension.size
-    return np.concatenate(keep)
-
-
-def _vlrs(header: LasHeader, entries: bytes) -> list[bytes]:
-    """The records of the new file: those of the old one, with the new description of extra bytes.
-
-    The old compression record goes (the new one is added by the sink), and so do the COPC records:
-    they say at which byte of the file each octree cell lies, which is no longer so.
-    """
-    dropped = {(EXTRA_USER, EXTRA_RECORD), (LASZIP_USER, LASZIP_RECORD)}
-    vlrs = [
-        v.raw
+    # From the bytes of the file: laspy would write some records other than it read them.
+    new.vlrs = [
+        laspy.VLR(v.user_id, v.record_id, v.description, v.data)
         for v in header.vlrs
-        if (v.user_id, v.record_id) not in dropped and not _is_copc(header, v.user_id)
+        if (v.user_id, v.record_id) not in REWRITTEN and not _is_octree(header, v.user_id)
     ]
-    return vlrs + extra_vlrs(entries)
+    for record in new.vlrs.get("ExtraBytesVlr"):  # and it forgets a value that means "no data"
+        record.extra_bytes_structs = [
+            entry if entry.format_name() in {d.name for d in dimensions}
+            else entries.get(entry.format_name(), entry)
+            for entry in record.extra_bytes_structs
+        ]  # fmt: skip
+    new.creation_date = new.creation_date or NO_DATE
+    # laspy writes LAS from 1.1 on, and no point format in a version that did not have it.
+    version, dims = laspy.header.Version, laspy.point.dims
+    if new.point_format.id not in dims.VERSION_TO_POINT_FMT.get(str(new.version), ()):
+        least = dims.preferred_file_version_for_point_format(new.point_format.id)
+        new.version = max(version.from_str(least), version(1, min(new.version.minor, 4)))
+    return new
 
 
-def _is_copc(header: LasHeader, user_id: str) -> bool:
+def _is_own(dimension: laspy.DimensionInfo) -> bool:
+    return dimension.description.startswith(OWN_MARK)
+
+
+def _is_octree(header: CheckedHeader, user_id: str) -> bool:
+    """Whether a record is one of COPC: they say at which byte of the file each octree cell lies,
+    which is no longer so."""
     return header.format == "copc" and user_id == "copc"
 
 
-def _write_preamble(
-    header: LasHeader,
-    out: BinaryIO,
-    vlrs: list[bytes],
-    laszip: bytes | None,
-    record_length: int,
-) -> None:
-    """Header block, records and gap: all that stands before the points."""
-    if laszip is not None:
-        vlrs = [*vlrs, laszip_vlr(laszip)]
-    if record_length > 0xFFFF:
+def _check_can_be_kept(header: CheckedHeader, names: set[str]) -> None:
+    """Refuse what laspy would write other than it is."""
+    theirs = [d for d in header.las.point_format.extra_dimensions if not _is_own(d)]
+    for name in names & {d.name for d in theirs}:
         raise InputError(
-            f"a point would have {record_length} bytes, and LAS allows 65535", file=header.path
+            f"the survey already has a dimension {name!r} that scenenet did not write",
+            file=header.path,
+            remedy="Rename or remove it first (pdal translate --writers.las.extra_dims)",
         )
-    block = bytearray(header.raw)
-    offset = len(block) + sum(map(len, vlrs)) + len(header.gap)
-    format_byte = header.point_format | (0 if laszip is None else COMPRESSED_BIT)
-    struct.pack_into("<IIBH", block, 96, offset, len(vlrs), format_byte, record_length)
-    if header.version[1] >= 4:  # a file may have its count in the older field alone
-        struct.pack_into("<Q", block, 247, header.n_points)
-    out.write(block)
-    for record in vlrs:
-        out.write(record)
-    out.write(header.gap)
+    records = [*header.las.vlrs, *(header.las.evlrs or ())]
+    texts = [r.user_id for r in records] + [e.description for e in header.las.evlrs or ()]
+    if not all(isinstance(text, str) and text.isascii() for text in texts):
+        raise InputError(
+            "the name or description of a record is not ASCII, which laspy cannot write",
+            file=header.path,
+            remedy="Rewrite the survey with another tool (pdal translate, las2las)",
+        )
+    if header.waveforms_inside:
+        raise InputError(
+            "its waveforms are inside of the file, where a prediction cannot be added to them",
+            file=header.path,
+            remedy="Write the points without waveforms first (pdal translate "
+            "--writers.las.dataformat_id, las2las -set_point_type)",
+        )
 
 
-def _copy_evlrs(header: LasHeader, out: BinaryIO) -> None:
-    """Put the extended records behind the points, and their new places into the header."""
-    out.seek(0, 2)
-    evlrs = [e for e in header.evlrs if not _is_copc(header, e.user_id)]
-    places = {}
-    with header.path.open("rb") as source:
-        for evlr in evlrs:
-            places[evlr.start] = out.tell()
-            source.seek(evlr.start)
-            left = EVLR_HEAD + evlr.length
-            while left:
-                block = source.read(min(left, 2**20))
-                if not block:
-                    raise InputError("the file became shorter while it was read", file=header.path)
-                out.write(block)
-                left -= len(block)
-    minor = header.version[1]
-    if minor >= 3:
-        # Offsets of waveforms count from the head of their record: moving it whole keeps them.
-        waveforms = struct.unpack_from("<Q", header.raw, 227)[0]
-        out.seek(227)
-        out.write(struct.pack("<Q", places.get(waveforms, 0)))
-    if minor >= 4:
-        out.seek(235)
-        out.write(struct.pack("<QI", min(places.values(), default=0), len(evlrs)))
+def _check_channels(source: Path, channels: set[int], compressed: bool) -> None:
+    if compressed and len(channels) > 1:
+        raise InputError(
+            "its points have waveform packets of several scanner channels, which cannot be "
+            "compressed without mixing them up",
+            file=source,
+            remedy="Name a .las file for the result, or write the points without waveforms first "
+            "(pdal translate --writers.las.dataformat_id, las2las -set_point_type)",
+        )

@@ -13,12 +13,13 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from scenenet.errors import InputError
 from scenenet.pointcloud import decoder
-from scenenet.pointcloud.header import LasHeader
+from scenenet.pointcloud.header import CheckedHeader
 
 STALL_SECONDS = float(os.environ.get("SCENENET_STALL_SECONDS", "8"))
 """Seconds without a single decoded point after which a file counts as one that hangs. Points come
@@ -28,38 +29,20 @@ MAX_BYTES = 4 * 2**30
 """Address space that the decoder may ask for. An honest file needs some hundred MB."""
 PIECE_POINTS = 200_000
 """Points decoded and handed over at once: enough to keep two cores busy with chunks of 50 000."""
-CLASS_BYTE_LEGACY, CLASS_BYTE = 15, 16
-"""Byte of the class code in a point record of formats 0-5, and of 6-10."""
 REMEDY = (
     "Get the file again from where it came from; if it is the same there, rewrite it with another "
     "tool (pdal translate, las2las, laszip)"
 )
 
 
-def class_byte(header: LasHeader) -> int:
-    return CLASS_BYTE_LEGACY if header.point_format < 6 else CLASS_BYTE
-
-
-def _job(header: LasHeader, whole_records: bool, stall_seconds: float) -> dict:
-    compression = header.compression
-    if compression is None:
-        raise ValueError(f"{header.path} is not compressed")
-    chunk = compression.chunk_size
-    piece = PIECE_POINTS
-    if compression.is_chunked and 0 < chunk <= PIECE_POINTS:
-        piece = PIECE_POINTS // chunk * chunk  # whole chunks, so that none is cut and kept
+def _job(
+    header: CheckedHeader, chunk_points: int, places_only: bool, stall_seconds: float
+) -> dict[str, Any]:
     return {
         "path": str(header.path.resolve()),
-        "offset": header.offset_to_points,
-        "record_length": header.record_length,
-        "class_byte": class_byte(header),
-        "n_points": header.n_points,
-        "piece": piece,
-        "laszip": compression.record.hex(),
-        "chunked": compression.is_chunked,
-        "variable_chunks": chunk in (0, 0xFFFFFFFF),
-        "chunk_size": chunk,
-        "whole_records": whole_records,
+        "places_only": places_only,
+        "chunk": chunk_points,
+        "piece": PIECE_POINTS,
         "watchdog_s": max(1, int(decoder.WATCHDOG_FACTOR * stall_seconds)),
         "max_bytes": MAX_BYTES,
     }
@@ -72,29 +55,31 @@ def _command(job: dict) -> list[str]:
 
 
 def decompress(
-    header: LasHeader,
+    header: CheckedHeader,
+    chunk_points: int,
     *,
-    whole_records: bool,
+    places_only: bool = False,
     stall_seconds: float | None = None,
     command: Sequence[str] | None = None,
-) -> Iterator[np.ndarray | tuple[np.ndarray, np.ndarray]]:
+) -> Iterator[np.ndarray]:
     """Decompress the points of a LAZ file in another process.
 
     Args:
         header: its checked header.
-        whole_records: yield (n, record_length) uint8 records; else ((3, n) int32 X, Y, Z and
-            (n,) uint8 class bytes), which is faster.
+        chunk_points: points in each array but the last.
+        places_only: only coordinates and class are needed, which is faster; other fields may be 0.
         stall_seconds: time without a sign of life after which the process is stopped.
         command: what to start in place of the worker.
 
     Yields:
-        pieces in the order of the file, ``header.n_points`` points in all.
+        (n,) structured arrays of point records as laspy has them, all of the header's points.
 
     Raises:
         InputError: the decoder refused the file, crashed, hung, or ended early.
     """
     stall = STALL_SECONDS if stall_seconds is None else stall_seconds
-    command = _command(_job(header, whole_records, stall)) if command is None else list(command)
+    if command is None:
+        command = _command(_job(header, chunk_points, places_only, stall))
     environment = os.environ | {
         "RUST_BACKTRACE": "0",
         "RAYON_NUM_THREADS": os.environ.get("RAYON_NUM_THREADS", str(min(os.cpu_count() or 1, 4))),
@@ -103,60 +88,45 @@ def decompress(
     }
     with tempfile.TemporaryFile() as errors:
         worker = subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors,
+            list(command), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors,
             env=environment,
         )  # fmt: skip
         try:
             with contextlib.closing(_Pipe(worker, header, stall, errors)) as pipe:
-                yield from _pieces(pipe, header, whole_records)
+                yield from _chunks(pipe, header, chunk_points)
         finally:
             worker.kill()
             worker.wait()
 
 
-def _pieces(pipe: _Pipe, header: LasHeader, whole_records: bool) -> Iterator:
-    done = 0
-    while True:
-        kind, n = decoder.FRAME.unpack(pipe.read(decoder.FRAME.size, done))
-        if kind == b"P" and 0 < n <= header.n_points - done:
-            if whole_records:
-                records = np.empty((n, header.record_length), np.uint8)
-                pipe.fill(records, done)
-                yield records
-            else:
-                integers, codes = np.empty((3, n), "<i4"), np.empty(n, np.uint8)
-                pipe.fill(integers, done)
-                pipe.fill(codes, done)
-                yield integers, codes
-            done += n
-        elif kind == b"E":
-            raise _refusal(header, bytes(pipe.read(n, done)).decode(errors="replace"), done)
-        elif kind == b"D" and done == header.n_points:
-            return
-        else:
-            raise InputError(
-                f"the decoder sent something that is not points after {_count(done, header)}",
-                file=header.path,
-                remedy=REMEDY,
-            )
+def _chunks(pipe: _Pipe, header: CheckedHeader, chunk_points: int) -> Iterator[np.ndarray]:
+    total, dtype = header.las.point_count, header.las.point_format.dtype()
+    done, filled = 0, 0
+    while done < total:
+        size = min(chunk_points, total - done)
+        n = pipe.announced(b"P", done + filled)
+        if not 0 < n <= size - filled:
+            raise pipe.nonsense(done + filled)
+        if filled == 0:  # not before the decoder had points of the length that the header claims
+            chunk = np.empty(size, dtype)
+        pipe.fill(chunk[filled : filled + n], done + filled)
+        filled += n
+        if filled == size:
+            yield chunk
+            done, filled = done + size, 0
+    pipe.announced(b"D", done)
 
 
-def _count(done: int, header: LasHeader) -> str:
-    return f"{done} of {header.n_points} points"
-
-
-def _refusal(header: LasHeader, text: str, done: int) -> InputError:
-    return InputError(
-        f"its compressed points cannot be decoded after {_count(done, header)} ({text})",
-        file=header.path,
-        remedy=REMEDY,
-    )
+def _count(done: int, header: CheckedHeader) -> str:
+    return f"{done} of {header.las.point_count} points"
 
 
 class _Pipe:
     """The worker's answers, read with a limit on how long nothing may come."""
 
-    def __init__(self, worker: subprocess.Popen, header: LasHeader, stall: float, errors) -> None:
+    def __init__(
+        self, worker: subprocess.Popen, header: CheckedHeader, stall: float, errors
+    ) -> None:
         assert worker.stdout is not None
         self._worker, self._header, self._stall, self._errors = worker, header, stall, errors
         self._out = worker.stdout
@@ -168,13 +138,35 @@ class _Pipe:
         self._selector.close()
         self._out.close()
 
-    def read(self, n: int, done: int) -> bytearray:
+    def announced(self, kind: bytes, done: int) -> int:
+        """The number of the next frame, which has to be of that kind."""
+        got, n = decoder.FRAME.unpack(self._read(decoder.FRAME.size, done))
+        if got == b"E":
+            text = self._read(min(n, 10_000), done).decode(errors="replace")
+            raise InputError(
+                "its compressed points cannot be decoded after "
+                f"{_count(done, self._header)} ({text})",
+                file=self._header.path,
+                remedy=REMEDY,
+            )
+        if got != kind:
+            raise self.nonsense(done)
+        return n
+
+    def nonsense(self, done: int) -> InputError:
+        return InputError(
+            f"the decoder sent something that is not points after {_count(done, self._header)}",
+            file=self._header.path,
+            remedy=REMEDY,
+        )
+
+    def fill(self, records: np.ndarray, done: int) -> None:
+        self._fill(records.view(np.uint8).data, done)
+
+    def _read(self, n: int, done: int) -> bytearray:
         data = bytearray(n)
         self._fill(memoryview(data), done)
         return data
-
-    def fill(self, array: np.ndarray, done: int) -> None:
-        self._fill(array.data.cast("B"), done)
 
     def _fill(self, view: memoryview, done: int) -> None:
         at = 0

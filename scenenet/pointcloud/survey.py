@@ -11,10 +11,9 @@ import numpy as np
 
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.crs import read_crs
-from scenenet.pointcloud.extra import extra_names
 from scenenet.pointcloud.header import read_header
 from scenenet.pointcloud.kinds import kind_of
-from scenenet.pointcloud.las import iter_points
+from scenenet.pointcloud.las import class_codes, coordinates, iter_records
 from scenenet.pointcloud.schemes import class_scheme
 from scenenet.pointcloud.ts40k import read_sample
 
@@ -22,8 +21,6 @@ if TYPE_CHECKING:
     import pyproj
 
 CHUNK_POINTS = 1_000_000
-PLAUSIBLE_POINTS_PER_BYTE = 10
-"""Compressed points take a byte or more each, but for made-up ones."""
 
 
 @dataclass(frozen=True)
@@ -74,20 +71,19 @@ def survey_info(path: str | Path) -> SurveyInfo:
             warnings=(),
         )  # fmt: skip
     header = read_header(path)
-    told = read_crs(header)
-    problems = header.warnings if told.problem is None else (*header.warnings, told.problem)
+    las, told = header.las, read_crs(header.las)
     return SurveyInfo(
         path=path,
         format=header.format,
-        version=f"{header.version[0]}.{header.version[1]}",
-        point_format=header.point_format,
-        n_points=header.n_points,
-        mins=_triple(header.mins),
-        maxs=_triple(header.maxs),
+        version=str(las.version),
+        point_format=las.point_format.id,
+        n_points=header.las.point_count,
+        mins=_triple(las.mins),
+        maxs=_triple(las.maxs),
         crs=told.crs,
-        scales=_triple(header.scales),
-        extra_dimensions=extra_names(header),
-        warnings=problems,
+        scales=_triple(las.scales),
+        extra_dimensions=tuple(las.point_format.extra_dimension_names),
+        warnings=header.warnings if told.problem is None else (*header.warnings, told.problem),
     )
 
 
@@ -119,9 +115,9 @@ def iter_chunks(
         parts = (slice(at, at + chunk_points) for at in range(0, len(xyz), chunk_points))
         return (PointCloud(xyz[part], classes[part], scheme) for part in parts)
     header = read_header(path)
-    crs = read_crs(header).crs
-    points = iter_points(header, chunk_points)
-    return (PointCloud(xyz, classes, scheme, crs) for xyz, classes in points)
+    crs = read_crs(header.las).crs
+    chunks = iter_records(header, chunk_points, places_only=True)
+    return (PointCloud(coordinates(c), class_codes(c), scheme, crs) for c in chunks)
 
 
 def read(path: str | Path, codes: str | None = None) -> PointCloud:
@@ -130,14 +126,7 @@ def read(path: str | Path, codes: str | None = None) -> PointCloud:
     Raises:
         InputError: as ``iter_chunks``.
     """
-    path = Path(path)
-    chunk_points = CHUNK_POINTS
-    if kind_of(path) == "las":
-        header = read_header(path)
-        # One chunk of all points needs no copy; a count that is beyond belief gets no memory.
-        if header.n_points <= PLAUSIBLE_POINTS_PER_BYTE * header.file_size:
-            chunk_points = max(chunk_points, header.n_points)
-    chunks = list(iter_chunks(path, codes, chunk_points))
+    chunks = list(iter_chunks(path, codes))
     if len(chunks) == 1:
         return chunks[0]
     scheme = None if codes is None else class_scheme(codes)

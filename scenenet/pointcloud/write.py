@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import struct
-from collections.abc import Mapping
+import datetime
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,27 +13,15 @@ import numpy as np
 from scenenet.errors import InputError
 from scenenet.files import atomic
 from scenenet.pointcloud.cloud import PointCloud
-from scenenet.pointcloud.header import COMPRESSED_BIT, HEADER_SIZES, RECORD_LENGTHS
-from scenenet.pointcloud.records import (
-    Dimensions,
-    PointSink,
-    checked,
-    extra_vlrs,
-    is_compressed,
-    laszip_vlr,
-    new_dimensions,
-    vlr,
-)
+from scenenet.pointcloud.dimensions import checked, new_dimensions
 
 if TYPE_CHECKING:
-    import pyproj
+    import laspy
 
 CHUNK_POINTS = 500_000
 INT32_MAX = np.iinfo(np.int32).max
-WKT_BIT = 0x10
-HEADER_SIZE, POINT_FORMAT = HEADER_SIZES[4], 6
-ONE_RETURN = 0x11
-"""Return number 1 of 1."""
+NO_DATE = datetime.date.min
+"""Stands for no date: same points, same file. laspy would write the day on which it is run."""
 
 
 def write_las(
@@ -65,48 +53,68 @@ def write_las(
 def write_cloud(
     path: Path,
     cloud: PointCloud,
-    dimensions: Dimensions,
+    dimensions: list[laspy.ExtraBytesParams],
     extra: Mapping[str, np.ndarray],
     scale: float,
 ) -> None:
-    compress = is_compressed(path)
+    import laspy
+
     arrays = checked(extra, dimensions, len(cloud))
-    offsets, mins, maxs = _offsets(path, cloud.xyz, scale)
-    base = RECORD_LENGTHS[POINT_FORMAT]
-    length = base + sum(dtype.itemsize for _, dtype in dimensions.values())
-    entries = b"".join(d.entry for d, _ in dimensions.values())
-    with atomic(path) as partial, partial.open("w+b") as out:
-        sink = PointSink(out, POINT_FORMAT, length - base, compress)
-        vlrs = [] if cloud.crs is None else [_wkt_vlr(cloud.crs)]
-        vlrs += extra_vlrs(entries)
-        if sink.record is not None:
-            vlrs.append(laszip_vlr(sink.record))
-        out.write(_new_header(len(cloud), vlrs, length, compress, scale, offsets, mins, maxs))
-        for record in vlrs:
-            out.write(record)
-        sink.start()
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.system_identifier, header.generating_software = "EXTRACTION", "scenenet"
+    header.creation_date = NO_DATE
+    header.scales, header.offsets = np.full(3, float(scale)), _offsets(path, cloud.xyz, scale)
+    header.add_extra_dims(dimensions)
+    if cloud.crs is not None:
+        header.add_crs(cloud.crs)
+    with open_writer(path, header) as writer:
         for at in range(0, len(cloud), CHUNK_POINTS):
             part = slice(at, at + CHUNK_POINTS)
-            records = np.zeros((len(cloud.xyz[part]), length), np.uint8)
-            integers = np.rint((cloud.xyz[part] - offsets) / scale).astype("<i4")
-            records[:, :12] = integers.view(np.uint8)
-            records[:, 14] = ONE_RETURN
-            records[:, 16] = cloud.classification[part]
-            place = base
-            for name, (_, dtype) in dimensions.items():
-                end = place + dtype.itemsize
-                values = np.ascontiguousarray(arrays[name][part])
-                records[:, place:end] = values.view(np.uint8).reshape(len(records), -1)
-                place = end
-            sink.write(records)
-        sink.finish()
+            n = len(cloud.xyz[part])
+            points = laspy.ScaleAwarePointRecord.zeros(n, header=writer.header)
+            for axis, name in enumerate("xyz"):
+                points[name][:] = cloud.xyz[part, axis]
+            points["classification"] = cloud.classification[part]
+            points["return_number"][:] = points["number_of_returns"][:] = 1
+            for name, values in arrays.items():
+                points[name] = values[part]
+            writer.write_points(points)
 
 
-def _offsets(path: Path, xyz: np.ndarray, scale: float):
+@contextlib.contextmanager
+def open_writer(path: Path, header: laspy.LasHeader) -> Iterator[laspy.LasWriter]:
+    """laspy's writer of a file that appears whole or not at all; compressed by its suffix.
+
+    Raises:
+        InputError: the suffix is neither ``.las`` nor ``.laz``.
+    """
+    import laspy
+
+    suffix = path.suffix.lower()
+    if suffix not in (".las", ".laz"):
+        raise InputError(
+            f"a point cloud cannot be written as {suffix or 'a file without a suffix'}",
+            file=path,
+            remedy="Name a .laz (compressed) or .las file",
+        )
+    for record in header.vlrs.get("ExtraBytesVlr"):
+        for entry in record.extra_bytes_structs:
+            if entry.data_type:  # 0 is plain bytes, whose options are a count
+                # laspy takes the first point of a chunk for its least and greatest value.
+                entry.options &= ~(entry.MIN_BIT_MASK | entry.MAX_BIT_MASK)
+    with (
+        atomic(path) as partial,
+        # Text of other writers that is not ASCII is kept as the bytes it is.
+        laspy.open(partial, mode="w", header=header, encoding_errors="surrogateescape") as writer,
+    ):
+        yield writer
+
+
+def _offsets(path: Path, xyz: np.ndarray, scale: float) -> np.ndarray:
     if not scale > 0:
         raise ValueError(f"the scale must be above 0, not {scale}")
     if len(xyz) == 0:
-        return np.zeros(3), np.zeros(3), np.zeros(3)
+        return np.zeros(3)
     mins, maxs = xyz.min(axis=0), xyz.max(axis=0)
     if not np.isfinite([mins, maxs]).all():
         raise InputError("coordinates that are not numbers cannot be written", file=path)
@@ -121,35 +129,4 @@ def _offsets(path: Path, xyz: np.ndarray, scale: float):
             file=path,
             remedy="Remove stray points, or write with a larger scale",
         )
-    stored = np.rint((np.array([mins, maxs]) - offsets) / scale) * scale + offsets
-    return offsets, stored[0], stored[1]
-
-
-def _new_header(
-    n: int, vlrs: list[bytes], length: int, compress: bool, scale: float, offsets, mins, maxs
-) -> bytes:
-    """Public header block of LAS 1.4 (R15, Table 3), without a date: same points, same file."""
-    block = bytearray(HEADER_SIZE)
-    block[:4] = b"LASF"
-    struct.pack_into("<H", block, 6, WKT_BIT)
-    block[24:26] = b"\x01\x04"
-    struct.pack_into("<32s32s", block, 26, b"EXTRACTION", b"scenenet")
-    offset = HEADER_SIZE + sum(map(len, vlrs))
-    format_byte = POINT_FORMAT | (COMPRESSED_BIT if compress else 0)
-    struct.pack_into("<HIIBH", block, 94, HEADER_SIZE, offset, len(vlrs), format_byte, length)
-    box = np.column_stack([maxs, mins]).ravel()
-    struct.pack_into("<12d", block, 131, *([scale] * 3), *offsets, *box)
-    struct.pack_into("<QQ", block, 247, n, n)  # all points, and those of the first return
-    return bytes(block)
-
-
-def _wkt_vlr(crs: pyproj.CRS) -> bytes:
-    import pyproj
-
-    # LAS 1.4 asks for WKT 1. Where that would lose something, WKT 2 is better than a wrong system.
-    text = crs.to_wkt()
-    with contextlib.suppress(pyproj.exceptions.CRSError):
-        old = crs.to_wkt("WKT1_GDAL")
-        if pyproj.CRS.from_wkt(old).equals(crs, ignore_axis_order=True):
-            text = old
-    return vlr("LASF_Projection", 2112, "OGC coordinate system WKT", text.encode() + b"\0")
+    return offsets

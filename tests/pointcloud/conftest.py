@@ -7,6 +7,7 @@ from pathlib import Path
 
 import laspy
 import numpy as np
+import pyproj
 import pytest
 
 MakeLas = Callable[..., Path]
@@ -33,7 +34,7 @@ def make_las(tmp_path: Path) -> MakeLas:
         for dimension, dtype in (extra or {}).items():
             header.add_extra_dim(laspy.ExtraBytesParams(dimension, dtype, description="theirs"))
         if crs is not None:
-            header.add_crs(crs)
+            header.add_crs(pyproj.CRS(crs))
         las = laspy.LasData(header)
         las.points = laspy.ScaleAwarePointRecord.zeros(n, header=header)
         for axis in "XYZ":

@@ -1,0 +1,72 @@
+"""Dimensions that are added to points: whether LAS can hold them and their values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import laspy
+
+Dimension = np.dtype | type | str | tuple[np.dtype | type | str, str]
+"""Type of a dimension to add, or (type, description)."""
+TYPES = tuple(np.dtype(t) for t in ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8"))
+TEXT_BYTES = 32
+"""Bytes for a name, and for a description."""
+OWN_MARK = "scenenet:"
+"""Begins the description of dimensions that this package adds, so that it may replace its own."""
+
+
+def new_dimensions(names: Mapping[str, Dimension], *, own: bool) -> list[laspy.ExtraBytesParams]:
+    """The dimensions ``names``; with ``own``, marked as such. Long descriptions are cut.
+
+    Raises:
+        ValueError: LAS cannot hold a dimension of such a name or type.
+    """
+    import laspy
+
+    taken = {"x", "y", "z"}
+    taken.update(n.lower() for f in range(11) for n in laspy.PointFormat(f).dimension_names)
+    made = []
+    for name, given in names.items():
+        kind, description = given if isinstance(given, tuple) else (given, "")
+        dtype = np.dtype(kind)
+        dtype = np.dtype(np.uint8) if dtype == np.bool_ else dtype.newbyteorder("<")
+        if dtype not in TYPES:
+            raise ValueError(f"an extra dimension cannot hold {dtype}: take one of {TYPES}")
+        if not 0 < len(name.encode()) <= TEXT_BYTES or name.lower() in taken:
+            raise ValueError(
+                f"{name!r} cannot name an extra dimension: 1 to {TEXT_BYTES} bytes, and none of "
+                "the names that LAS gives its own dimensions"
+            )
+        text = f"{OWN_MARK} {description}" if own else description
+        told = text.encode("ascii", errors="replace")[:TEXT_BYTES].decode()
+        made.append(laspy.ExtraBytesParams(name, dtype, description=told))
+    return made
+
+
+def checked(
+    arrays: Mapping[str, np.ndarray], dimensions: list[laspy.ExtraBytesParams], n: int
+) -> dict[str, np.ndarray]:
+    """The values of ``n`` points, in the types of their dimensions.
+
+    Raises:
+        ValueError: values are missing, too many, of the wrong shape, or beyond their type.
+    """
+    promised = sorted(dimension.name for dimension in dimensions)
+    if sorted(arrays) != promised:
+        raise ValueError(f"values for {sorted(arrays)}, but promised were {promised}")
+    result = {}
+    for dimension in dimensions:
+        array, dtype = np.asarray(arrays[dimension.name]), dimension.type
+        if array.shape != (n,):
+            raise ValueError(f"{dimension.name} must have the shape ({n},), not {array.shape}")
+        if dtype.kind in "iu":
+            limits = np.iinfo(dtype)
+            whole = array.dtype.kind in "iub"
+            if not whole or (n and not limits.min <= array.min() <= array.max() <= limits.max):
+                raise ValueError(f"{dimension.name} has values that {dtype} cannot hold")
+        result[dimension.name] = array.astype(dtype)
+    return result

@@ -97,7 +97,7 @@ def _stretches(manifest: str | Path, settings: SplitSettings) -> pd.DataFrame:
     xy, radius = crops[["x", "y"]].to_numpy(float), crops["radius"].to_numpy(float)
     step = np.linalg.norm(np.diff(xy, axis=0), axis=1)
     overlap = np.append(False, step < radius[1:] + radius[:-1])[: len(crops)]
-    beside = np.append(False, step < settings.neighbour)[: len(crops)] | overlap
+    beside = np.append(False, step < settings.neighbour)[: len(crops)]
     numbers, number, length = [], -1, 0
     for i in range(len(crops)):
         apart = not beside[i] or (length >= settings.stretch and not overlap[i])

@@ -15,7 +15,9 @@ from scenenet.pointcloud import PointCloud, class_scheme
 
 # The same examples each time, so that a test fails because of a change and not because of luck; no
 # deadline, because the first example of some tests waits for a compiler.
-hypothesis.settings.register_profile("same-each-time", deadline=None, derandomize=True)
+hypothesis.settings.register_profile(
+    "same-each-time", deadline=None, derandomize=True, max_examples=50
+)
 # To look further: pytest --hypothesis-profile=explore
 hypothesis.settings.register_profile("explore", deadline=None, max_examples=2000)
 hypothesis.settings.load_profile("same-each-time")
@@ -52,7 +54,7 @@ def project_root() -> Path:
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:
-    """Folder of real recordings, which are never part of the project; skips where there are none."""
+    """Folder of real recordings, which are no part of the project; skips where there are none."""
     folder = Path(os.environ.get("SCENENET_REAL_DATA", ROOT.parent / "shared" / "data"))
     if not folder.is_dir():
         pytest.skip("no real recordings here: set SCENENET_REAL_DATA to a folder that has them")

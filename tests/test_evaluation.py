@@ -1,0 +1,164 @@
+"""Scores of a model on crops, with models and crops whose outcome is known."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import torch
+
+from scenenet.crops import Crop
+from scenenet.detection import DetectionSettings
+from scenenet.errors import InputError
+from scenenet.evaluation import evaluate, score
+from scenenet.modelfile import ModelCard, write_model
+from scenenet.models import VoxelModel
+from scenenet.voxel_store import Dataset
+from scenenet.voxels import VoxelGrid, VoxelSample
+
+SHAPE = (12, 3, 30)
+GRID = VoxelGrid((0.0, 0.0, 0.0), 1.0, SHAPE)
+CARD = ModelCard(
+    name="mock", codes="edp", measurement="presence", fit="metric", resolution=64, voxel_size=1.0,
+    tau=0.5, provenance={"seed": 4},
+)  # fmt: skip
+
+
+class Mock(VoxelModel):
+    """Answers every crop with the probabilities it was told."""
+
+    kind = "mock"
+    kernel_size = (1, 1, 1)
+
+    def __init__(self, *answers: dict[tuple[int, int, int], float]) -> None:
+        super().__init__()
+        self.answers = iter(answers)
+
+    def observer(self):
+        raise NotImplementedError
+
+    def forward(self, occupancy):
+        volume = torch.zeros((1, *SHAPE))
+        for (z, y, x), probability in next(self.answers).items():
+            volume[0, z, y, x] = probability
+        return volume
+
+
+def pole(x: int, probability: float = 1.0, low: int = 0, high: int = 12):
+    return {(z, 1, x): probability for z in range(low, high)}
+
+
+def crop(number: int, *xs: int, empty=()):
+    """A crop with true poles at ``xs`` on a strip of ground, all of it occupied but ``empty``."""
+    occupied = {(0, 1, x) for x in range(30)} | {v for x in xs for v in pole(x)}
+    occupied |= {v for x in (5, 15, 25) for v in pole(x)}
+    true = {v for x in xs for v in pole(x)}
+    places = sorted(np.ravel_multi_index(v, SHAPE) for v in occupied - set(empty))
+    truth = {np.ravel_multi_index(v, SHAPE) for v in true}
+    index = np.array(places, np.int32)
+    sample = VoxelSample(
+        f"crop-{number}", GRID, index, np.ones_like(index), np.array([i in truth for i in places])
+    )
+    towers = np.array([[x + 0.5, 1.5] for x in xs]).reshape(-1, 2)
+    return sample, Crop(sample.id, 15.0, 1.5, 15.0, towers)
+
+
+def scores(model: Mock, *crops, tau: float = 0.5):
+    samples, of_samples = zip(*crops, strict=True)
+    dataset = Dataset(list(samples), list(of_samples), "edp", [])
+    return score(model, CARD.with_tau(tau), dataset, DetectionSettings())
+
+
+def test_a_perfect_model_scores_one():
+    result = scores(Mock(pole(5), pole(15)), crop(1, 5), crop(2, 15))
+    for name in ("precision", "recall", "f05", "iou_tower", "miou"):
+        assert result["voxel"][name] == 1.0
+    assert result["towers"] == {
+        "precision": 1.0, "recall": 1.0, "median_error_m": 0.0, "n_true": 2, "n_predicted": 2,
+    }  # fmt: skip
+    assert result["average_precision"] == 1.0
+    assert result["alive"] is True
+    assert (result["model"], result["seed"]) == ("mock", 4)
+    assert result["voxel"]["n_samples"] == 2
+    assert result["voxel"]["tau"] == 0.5
+
+
+def test_counts_of_all_crops_make_the_scores():
+    # crop 1: 12 of 12 tower voxels; crop 2: 12 false ones, 12 missed
+    result = scores(Mock(pole(5), pole(25)), crop(1, 5), crop(2, 15))
+    assert result["voxel"]["precision"] == 0.5
+    assert result["voxel"]["recall"] == 0.5
+    assert result["voxel"]["iou_tower"] == pytest.approx(12 / 36)
+    volume = 2 * np.prod(SHAPE)
+    assert result["voxel"]["miou"] == pytest.approx((12 / 36 + (volume - 36) / (volume - 12)) / 2)
+    assert [(s["tp"], s["fp"], s["fn"]) for s in result["per_sample"]] == [(12, 0, 0), (0, 12, 12)]
+    assert [s["f05"] for s in result["per_sample"]] == [1.0, 0.0]
+
+
+def test_a_model_that_says_nothing_scores_as_the_trivial_one():
+    result = scores(Mock({}), crop(1, 5))
+    assert result["voxel"] == result["voxel_trivial"]
+    assert result["voxel"]["miou"] == pytest.approx(0.5, abs=0.01)
+    assert result["voxel"]["iou_tower"] == 0.0
+    assert result["alive"] is False
+    assert result["towers"]["median_error_m"] is None
+    assert result["per_sample"][0]["position_error_m"] is None
+
+
+def test_empty_voxels_count_but_not_among_the_occupied():
+    ghost = {(z, 2, 20): 1.0 for z in range(4)}  # where there is no point
+    result = scores(Mock(pole(5) | ghost), crop(1, 5))
+    assert result["voxel"]["precision"] == 12 / 16
+    assert result["voxel_occupied"]["precision"] == 1.0
+    assert result["towers"]["n_predicted"] == 1
+
+
+def test_a_voxel_at_tau_is_detected():
+    assert scores(Mock(pole(5, 0.3)), crop(1, 5), tau=0.3)["voxel"]["recall"] == 1.0
+    assert scores(Mock(pole(5, 0.299)), crop(1, 5), tau=0.3)["voxel"]["recall"] == 0.0
+
+
+def test_a_detected_pole_out_of_reach_of_every_true_one_is_a_false_tower():
+    result = scores(Mock(pole(5) | pole(15)), crop(1, 5, 25))
+    assert result["towers"] == {
+        "precision": 0.5, "recall": 0.5, "median_error_m": 0.0, "n_true": 2, "n_predicted": 2,
+    }  # fmt: skip
+    [sample] = result["per_sample"]
+    assert (sample["towers_true"], sample["towers_predicted"]) == (2, 2)
+
+
+def test_the_curve_of_all_crops_has_the_scores_at_tau():
+    result = scores(Mock(pole(5, 0.8) | pole(15, 0.6)), crop(1, 5), tau=0.7)
+    curve = result["pr_curve"]
+    at = {tau: i for i, tau in enumerate(curve["tau"])}
+    for tau, precision in ((0.5, 0.5), (0.6, 0.5), (0.601, 1.0), (0.7, 1.0), (0.8, 1.0)):
+        assert curve["precision"][at[tau]] == precision
+    assert curve["precision"][at[0.7]] == result["voxel"]["precision"]
+    assert curve["recall"][at[0.801]] == 0.0
+
+
+def test_scores_are_plain_numbers():
+    result = scores(Mock(pole(5)), crop(1, 5))
+    assert json.loads(json.dumps(result, allow_nan=False)) == result
+
+
+def test_without_tau_there_is_no_score():
+    untuned = CARD.model_copy(update={"tau": None})
+    with pytest.raises(InputError, match="no detection threshold"):
+        score(Mock(), untuned, Dataset([], [], "edp", []), DetectionSettings())
+
+
+def test_only_the_part_asked_for_is_scored(chain, pole_finder, tmp_path):
+    write_model(tmp_path / "m.json", *pole_finder)
+    found = {
+        part: evaluate(tmp_path / "m.json", [chain.voxels], chain.split, DetectionSettings(), part)
+        for part in ("train", "validation", "test")
+    }
+    assert {p: r["voxel"]["n_samples"] for p, r in found.items()} == {
+        "train": 2, "validation": 1, "test": 3,
+    }  # fmt: skip
+    assert all(result["part"] == part for part, result in found.items())
+    towers = found["test"]["towers"]
+    assert (towers["n_true"], towers["recall"], towers["precision"]) == (3, 1.0, 1.0)
+    assert towers["median_error_m"] < 1.0

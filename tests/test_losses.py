@@ -1,0 +1,116 @@
+"""The GENEO loss, with numbers one can work out by hand (thesis 4.5)."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenenet.losses import VoxelWeights, fidelity, negativity
+from scenenet.models import CNN, SceneNet
+from scenenet.protocol import LossSettings
+
+
+def test_weights_of_the_thesis_setting_by_hand():
+    # p(1) = 0.1, p(0) = 0.9, alpha 5: f''(1) = 1 - 0.5 = 0.5, f''(0) = max(1 - 4.5, 0.1) = 0.1
+    # mean f'' = 0.1 * 0.5 + 0.9 * 0.1 = 0.14
+    weights = VoxelWeights.of_counts(10, 100, alpha=5.0, epsilon=0.1)
+    assert weights.tower == pytest.approx(0.5 / 0.14)
+    assert weights.empty == pytest.approx(0.1 / 0.14)
+
+
+def test_the_rarer_a_tower_voxel_the_more_it_weighs_up_to_one_over_epsilon():
+    ratios = []
+    for n_tower in (1000, 100, 10):
+        weights = VoxelWeights.of_counts(n_tower, 10_000, alpha=5.0, epsilon=0.1)
+        ratios.append(weights.tower / weights.empty)
+    assert ratios == pytest.approx([5.0, 9.5, 9.95])
+
+
+@given(
+    st.integers(0, 1000), st.integers(1000, 10**6), st.floats(0, 20), st.floats(0.001, 1)
+)  # fmt: skip
+def test_the_mean_weight_is_one_and_none_is_zero(n_tower, n_voxels, alpha, epsilon):
+    weights = VoxelWeights.of_counts(n_tower, n_voxels, alpha, epsilon)
+    total = n_tower * weights.tower + (n_voxels - n_tower) * weights.empty
+    assert total / n_voxels == pytest.approx(1.0)
+    assert weights.tower > 0
+    assert weights.empty > 0
+
+
+@given(st.integers(0, 1000), st.integers(1000, 10**6), st.floats(0.001, 1))
+def test_weights_are_uniform_for_alpha_0(n_tower, n_voxels, epsilon):
+    weights = VoxelWeights.of_counts(n_tower, n_voxels, 0.0, epsilon)
+    assert (weights.tower, weights.empty) == pytest.approx((1.0, 1.0))
+
+
+@given(st.integers(0, 99), st.sampled_from([0.0, 0.05, 1.0]))
+def test_fidelity_is_the_mean_of_the_weighted_squared_error(seed, share):
+    generator = torch.Generator().manual_seed(seed)
+    prediction = torch.rand((2, 3, 4, 5), generator=generator, dtype=torch.float64)
+    truth = (torch.rand((2, 3, 4, 5), generator=generator) < share).double()
+    weights = VoxelWeights(empty=0.7, tower=9.0)
+    tower = torch.nonzero(truth.reshape(-1)).reshape(-1)
+    f_w = torch.where(truth > 0, weights.tower, weights.empty)
+    expected = (f_w * (prediction - truth) ** 2).mean()
+    torch.testing.assert_close(fidelity(prediction, tower, weights), expected)
+
+
+def test_fidelity_by_hand_and_its_gradient():
+    prediction = torch.tensor([[[[0.5, 0.25, 0.0, 1.0]]]], requires_grad=True)
+    loss = fidelity(prediction, torch.tensor([0]), VoxelWeights(empty=2.0, tower=8.0))
+    # (8 * 0.25 + 2 * 0.0625 + 0 + 2 * 1) / 4
+    assert loss.item() == pytest.approx(4.125 / 4)
+    loss.backward()
+    # 2 w (p - y) / 4
+    assert prediction.grad.flatten().tolist() == pytest.approx([-2.0, 0.25, 0.0, 1.0])
+
+
+def test_a_perfect_prediction_has_no_error():
+    truth = torch.tensor([[[[0.0, 1.0, 0.0]]]])
+    assert fidelity(truth, torch.tensor([1]), VoxelWeights(0.1, 9.0)).item() == 0.0
+
+
+POSITIVE = {
+    "cylinder.r": 1.0, "cylinder.sigma": 1.0,
+    "arrow.r": 1.0, "arrow.sigma": 1.0, "arrow.r_c": 1.0, "arrow.beta": 0.5,
+    "negative_sphere.r": 1.0, "negative_sphere.sigma": 1.0, "negative_sphere.omega": 0.1,
+    "lambda.cylinder": 0.3, "lambda.arrow": 0.3, "lambda.negative_sphere": 0.4,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("changes", "penalty"),
+    [
+        ({}, 0.0),
+        ({"cylinder.sigma": -0.5}, 2 * 0.5),
+        ({"arrow.beta": -0.25, "negative_sphere.r": -1.0}, 2 * 1.25),
+        # The derived weight is penalised as the others are.
+        ({"lambda.cylinder": 0.8, "lambda.negative_sphere": -0.1}, 3 * 0.1),
+        ({"lambda.cylinder": -0.5, "lambda.negative_sphere": 1.2, "arrow.r": -1.0}, 3 * 0.5 + 2),
+    ],
+)
+def test_what_is_negative_costs_rho_times_what_it_lacks(changes, penalty):
+    model = SceneNet()
+    model.set_shape_parameters(POSITIVE | changes)
+    settings = LossSettings(rho_shape=2.0, rho_mixing=3.0)
+    assert negativity(model, settings).item() == pytest.approx(penalty, abs=1e-6)
+
+
+def test_the_penalty_pushes_a_negative_number_up_and_leaves_the_others():
+    model = SceneNet()
+    model.set_shape_parameters(POSITIVE | {"cylinder.sigma": -0.5})
+    negativity(model, LossSettings(rho_shape=5.0)).backward()
+    assert model.shapes["cylinder"]["sigma"].grad.item() == -5.0
+    assert model.shapes["cylinder"]["r"].grad.item() == 0.0
+
+
+def test_a_cnn_has_nothing_to_be_negative_about():
+    assert negativity(CNN(), LossSettings()).item() == 0.0
+
+
+def test_the_defaults_are_those_of_the_thesis():
+    settings = LossSettings()
+    assert (settings.alpha, settings.epsilon) == (5.0, 0.1)
+    assert (settings.rho_shape, settings.rho_mixing) == (5.0, 5.0)

@@ -1,0 +1,92 @@
+"""The JSON schemas and the table of settings, written from the models."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticUndefined
+
+from scenenet.config import Config, SyntheticSurvey
+from scenenet.config_errors import model_in
+from scenenet.files import write_json, write_text
+from scenenet.protocol import ModelSettings
+from scenenet.surveys import SurveyRow
+
+HEAD = """\
+# Settings
+
+`config.yaml` is read on every run; a file given with `--configfile` is laid over it: mappings are
+merged key by key, lists are replaced. `--config KEY=VALUE` comes last. A setting that is written
+nowhere has the default below. `RESULTS_DIR/config.yaml` has all settings of a run.
+
+| file | what it is for |
+|---|---|
+| `config.yaml` | the full reproduction, on synthetic surveys |
+| `test.yaml` | the same chain in minutes |
+| `ts40k.yaml` | real samples of TS40K: `--config ts40k_dir=FOLDER` |
+| `surveys.tsv` | the survey sheet, see `docs/surveys.md` |
+| `thesis.yaml` | published numbers |
+
+This page is written by `python -m scenenet.config --reference config/README.md`.
+"""
+
+SECTIONS: Mapping[str, type[BaseModel]] = {
+    "Everything": Config,
+    "Each entry of `models`": ModelSettings,
+    "Each entry of `synthetic.surveys`": SyntheticSurvey,
+}
+
+
+def schemas() -> dict[str, dict[str, Any]]:
+    """File name -> JSON schema of what it describes."""
+    draft = "https://json-schema.org/draft/2020-12/schema"
+    return {
+        "config.schema.json": {"$schema": draft, **Config.model_json_schema()},
+        "surveys.schema.json": {"$schema": draft, **SurveyRow.model_json_schema()},
+    }
+
+
+def write_schemas(folder: str | Path) -> None:
+    for name, schema in schemas().items():
+        write_json(Path(folder) / name, schema)
+
+
+def reference() -> str:
+    """The table of settings as Markdown."""
+    parts = [HEAD]
+    for title, model in SECTIONS.items():
+        parts.append(f"## {title}\n")
+        parts.append("| setting | default | what it is |\n|---|---|---|")
+        for key, field in settings_of(model):
+            meaning = (field.description or "").replace("|", "\\|").replace("\n", " ")
+            parts.append(f"| `{key}` | {_default(field)} | {meaning} |")
+        parts.append("")
+    return "\n".join(parts)
+
+
+def write_reference(path: str | Path) -> None:
+    write_text(path, reference())
+
+
+def settings_of(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
+    """Dotted name and field of every setting that is not a section itself."""
+    for name, field in model.model_fields.items():
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            yield from settings_of(annotation, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", field
+
+
+def _default(field: FieldInfo) -> str:
+    value = field.get_default(call_default_factory=True)
+    if value is PydanticUndefined:
+        return "(must be given)"
+    if model_in(field.annotation) is not None and not value:
+        return "(none)"
+    return f"`{json.dumps(value)}`"

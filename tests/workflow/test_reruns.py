@@ -1,0 +1,247 @@
+"""What runs again after a change, and what does not (docs/reruns.md)."""
+
+from __future__ import annotations
+
+import os
+import shutil
+
+import pytest
+
+pytestmark = pytest.mark.workflow
+
+PREDICTED = {"predict": 1, "prediction_map": 1, "report": 1}
+"""What follows from another best model: there is one survey to classify."""
+
+SCORED = {
+    "tune": 2,
+    "tune_cnn": 2,
+    "champion": 1,
+    "champion_cnn": 1,
+    "evaluate": 4,
+    "tables": 1,
+    "figures": 1,
+    "track": 1,
+    **PREDICTED,
+}
+"""What follows from trained models: two of each kind."""
+
+TRAINED = {"train": 2, "train_cnn": 2, **SCORED}
+SETTINGS = {"resolved_config": 1}
+"""The settings are written down whenever there are others."""
+
+
+# Surveys
+
+
+def test_a_new_survey_in_the_sheet_runs_its_own_jobs_and_the_report(project):
+    shutil.copy(project.folder / "data/own.laz", project.folder / "data/another.laz")
+    project.add_row("another", "data/another.laz", "edp", "new")
+    assert project.planned() == {"check": 1, **PREDICTED}
+
+
+def test_a_file_put_into_the_inbox_runs_its_own_jobs_and_the_report(project):
+    inbox = project.folder / "surveys"
+    inbox.mkdir()
+    shutil.copy(project.folder / "data/own.laz", inbox / "Line 7.laz")
+    assert project.planned() == {"check": 1, **PREDICTED}
+    assert "Classifying Line_7" in project.run("-n")
+
+
+def test_a_survey_to_train_on_makes_a_larger_dataset_and_reads_no_other_survey_again(project):
+    shutil.copy(project.folder / "data/own.laz", project.folder / "data/another.laz")
+    project.add_row("another", "data/another.laz", "edp", "train")
+    own = {"check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1}
+    assert project.planned() == {**own, "split": 1, **TRAINED}
+
+
+def test_touching_a_survey_runs_nothing(project):
+    (project.folder / "data/own.laz").touch()
+    assert project.planned() == {}
+
+
+def test_replacing_a_survey_by_an_older_file_runs_its_jobs(project):
+    survey = project.folder / "data/own.laz"
+    other = project.folder / "other.laz"
+    other.write_bytes(survey.read_bytes() + b"\0")
+    os.utime(other, (1_000_000_000, 1_000_000_000))
+    shutil.copy2(other, survey)  # as cp -p and rsync -a do
+    assert project.planned() == {"check": 1, **PREDICTED}
+
+
+def test_naming_other_class_codes_runs_the_jobs_that_read_them(project):
+    project.edit("config/surveys.tsv", "own.laz\tedp", "own.laz\tasprs")
+    assert project.planned() == {"check": 1, "report": 1}
+
+
+def test_the_order_and_the_date_of_the_sheet_decide_on_nothing(project):
+    sheet = project.folder / "config/surveys.tsv"
+    header, *rows = sheet.read_text().splitlines()
+    sheet.write_text("\n".join([header, "# mine", *reversed(rows)]) + "\n")
+    assert project.planned() == {}
+
+
+def test_taking_a_survey_out_of_the_sheet_only_writes_the_report_again(project):
+    project.edit("config/surveys.tsv", "own\tdata/own.laz\tedp\tnew\n", "")
+    assert project.planned() == {"report": 1}
+
+
+def test_another_recipe_makes_one_synthetic_survey_anew(project):
+    project.edit("config/config.yaml", "seed: 2", "seed: 22")
+    own = {"synthesize": 1, "check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1}
+    assert project.planned() == {**SETTINGS, **own, "split": 1, **TRAINED}
+
+
+# Settings
+
+
+def test_another_emphasis_of_the_loss_trains_again_and_prepares_nothing(project):
+    project.configure({"training.loss.alpha": 2.0})
+    assert project.planned() == {**SETTINGS, **TRAINED}
+
+
+def test_swapping_the_values_of_two_settings_trains_again(project):
+    """Snakemake compares parameters as a set, in which they would look the same."""
+    project.configure({"training.loss": {"alpha": 0.1, "epsilon": 5.0}})
+    assert project.planned() == {**SETTINGS, **TRAINED}
+
+
+def test_writing_a_default_down_changes_nothing(project):
+    project.configure({"training.loss": {"alpha": 5, "epsilon": 0.1}, "towers.eps": 10})
+    assert project.planned() == {}
+
+
+def test_a_setting_of_one_stage_runs_that_stage_and_what_follows(project):
+    project.configure({"detection.eps": 7.0})
+    after = {"evaluate": 4, "tables": 1, "figures": 1, "track": 1, **PREDICTED}
+    assert project.planned() == {**SETTINGS, **after}
+
+
+def test_another_resolution_keeps_the_grids_there_are(project):
+    project.configure({"voxels.resolution": 64})
+    assert project.planned() == {**SETTINGS, "voxels": 2, **TRAINED}
+    assert (project.results / "voxels/first/cube-32/manifest.json").exists()
+
+
+def test_predicting_with_another_model_trains_nothing(project):
+    project.configure({"predict.model": "cnn"})
+    assert project.planned() == {**SETTINGS, **PREDICTED}
+
+
+def test_one_more_seed_trains_only_that_seed(project):
+    project.configure({"seeds": [0, 1, 2]})
+    own = {"train": 1, "train_cnn": 1, "tune": 1, "tune_cnn": 1, "evaluate": 2}
+    assert project.planned() == {**SETTINGS, **TRAINED, **own}
+
+
+def test_one_seed_less_trains_nothing(project):
+    project.configure({"seeds": [0]})
+    gathered = {"champion": 1, "champion_cnn": 1, "tables": 1, "figures": 1, "track": 1}
+    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED}
+
+
+def test_one_more_model_leaves_the_others_alone(project):
+    kernel = {"name": "tall", "kind": "scenenet", "kernel_size": [15, 5, 5]}
+    models = [{"name": n, "kind": n} for n in ("scenenet", "cnn")]
+    project.configure({"models": [*models, kernel]})
+    own = {"train": 2, "tune": 2, "evaluate": 2, "champion": 1}
+    gathered = {"tables": 1, "figures": 1, "track": 1, "report": 1}
+    assert project.planned() == {**SETTINGS, **own, **gathered}
+
+
+# Code
+
+
+def test_touching_every_script_and_module_runs_nothing(project):
+    for folder in ("workflow", "scenenet"):
+        for file in (project.folder / folder).rglob("*.py"):
+            file.touch()
+    (project.folder / "Snakefile").touch()
+    assert project.planned() == {}
+
+
+def test_editing_a_docstring_or_a_comment_runs_nothing(project):
+    file = project.folder / "scenenet/training.py"
+    text = file.read_text()
+    assert text.startswith('"""The training loop')
+    file.write_text(text.replace('"""The training loop', '"""The loop', 1) + "# the end\n")
+    assert project.planned() == {}
+
+
+def test_editing_the_training_loop_trains_again_and_prepares_nothing(project):
+    with (project.folder / "scenenet/training.py").open("a") as stream:
+        stream.write("NOTHING = 0\n")
+    assert project.planned() == TRAINED
+
+
+def test_a_new_kernel_trains_again(project):
+    """All figures are drawn by one script, which knows the kernels."""
+    kernels = project.folder / "scenenet/geneo/kernels"
+    (kernels / "cone.py").write_text("# to come\nNOTHING = 0\n")
+    assert project.planned() == {**TRAINED, "tower_map": 2}
+
+
+def test_editing_the_report_writes_the_report_again(project):
+    with (project.folder / "scenenet/report/style.css").open("a") as stream:
+        stream.write("p { color: black }\n")
+    assert project.planned() == {"report": 1}
+
+
+def test_editing_the_check_reads_no_survey_for_the_dataset(project):
+    with (project.folder / "scenenet/pointcloud/check.py").open("a") as stream:
+        stream.write("NOTHING = 0\n")
+    assert project.planned() == {"check": 3, "tables": 1, "report": 1}
+
+
+def test_editing_the_command_line_runs_nothing(project):
+    with (project.folder / "scenenet/cli.py").open("a") as stream:
+        stream.write("NOTHING = 0\n")
+    assert project.planned() == {}
+
+
+def test_editing_a_script_runs_its_rule(project):
+    with (project.folder / "workflow/scripts/predict.py").open("a") as stream:
+        stream.write("NOTHING = 0\n")
+    assert project.planned() == PREDICTED
+
+
+# Results
+
+
+@pytest.mark.parametrize("file", ["crops.zarr.zip", "manifest.json"])
+def test_a_deleted_store_or_manifest_is_made_again(project, file):
+    (project.results / "crops/first" / file).unlink()
+    assert project.planned() == {"crops": 1, "split": 1, "voxels": 1, **TRAINED}
+
+
+def test_a_deleted_cache_of_voxels_is_made_again(project):
+    (project.results / "voxels/second/cube-32/voxels.zarr.zip").unlink()
+    assert project.planned() == {"voxels": 1, **TRAINED}
+
+
+@pytest.mark.parametrize(
+    ("file", "rule"), [("evaluate/cnn/seed-1.json", "evaluate"), ("tables/models.csv", "tables")]
+)
+def test_a_deleted_result_is_made_again(project, file, rule):
+    (project.results / file).unlink()
+    assert project.planned()[rule] == 1
+
+
+def test_a_deleted_prediction_is_made_again(project):
+    (project.results / "predict/own/own.laz").unlink()
+    assert project.planned() == PREDICTED
+
+
+def test_a_deleted_mlflow_store_is_made_again_with_all_its_runs(project):
+    (project.folder / "mlflow.db").unlink()
+    assert project.planned() == {"mlflow_store": 1, "track": 1, "report": 1}
+
+
+def test_what_others_log_to_the_mlflow_store_runs_nothing(project):
+    (project.folder / "mlflow.db").touch()
+    assert project.planned() == {}
+
+
+def test_other_published_numbers_are_put_beside_ours_without_training(project):
+    project.edit("config/thesis.yaml", "source: ", "source: Once more, ")
+    tables = {"tables": 1, "figures": 1, "track": 1, "report": 1}
+    assert project.planned() == tables

@@ -1,0 +1,98 @@
+"""Lists of what many jobs make, for the rules that gather it."""
+
+
+def each_training(pattern):
+    """``pattern`` for every model and seed."""
+    return [
+        pattern.format(model=model.name, seed=seed)
+        for model in settings.models
+        for seed in settings.seeds
+    ]
+
+
+def gathered(models=None, surveys=TRAIN, predicted=()):
+    """The arguments of ``scenenet.results.Results``. Models are pairs, because their order counts
+    and that of a dict does not survive in a parameter."""
+    chosen = settings.models if models is None else models
+    return {
+        "folder": R,
+        "models": [[model.name, model.kind] for model in chosen],
+        "seeds": list(settings.seeds) if chosen else [],
+        "surveys": list(surveys),
+        "predicted": list(predicted),
+    }
+
+
+def pictures(names):
+    """The two files of each picture."""
+    return {
+        "pictures": [f"{R}/figures/{name}.png" for name in names],
+        "captions": [f"{R}/figures/{name}.json" for name in names],
+    }
+
+
+def print_scores():
+    """Show the scores of every model on the terminal, once there are any."""
+    import pandas as pd
+
+    if not Path(R, "tables", "models.csv").exists():
+        return
+    table = pd.read_csv(f"{R}/tables/models.csv")
+    columns = ["model", "counted", "precision", "recall", "f05", "iou_tower", "miou"]
+    print(f"\nScores on the test crops of {settings.dataset}, {GRID}, tower voxels:")
+    print(table[columns].to_string(index=False, float_format="%.3f", na_rep="-"))
+    print(f"Report: {R}/report/index.html")
+
+
+# A folder of TS40K samples is no survey: there is no corridor to check, and no map to draw.
+CHECKED = [name for name, survey in SURVEYS.items() if not Path(survey.path).is_dir()]
+MAPPED = [
+    name for name in TRAIN if name in CHECKED and not SURVEYS[name].path.endswith((".npy", ".pt"))
+]
+
+CROP_STORES = expand(f"{R}/crops/{{survey}}/crops.zarr.zip", survey=TRAIN)
+CROP_MANIFESTS = expand(f"{R}/crops/{{survey}}/manifest.json", survey=TRAIN)
+VOXEL_STORES = expand(f"{R}/voxels/{{survey}}/{GRID}/voxels.zarr.zip", survey=TRAIN)
+VOXEL_MANIFESTS = expand(f"{R}/voxels/{{survey}}/{GRID}/manifest.json", survey=TRAIN)
+CROPS = [*CROP_STORES, *CROP_MANIFESTS]
+VOXELS = [*VOXEL_STORES, *VOXEL_MANIFESTS]
+CLASS_COUNTS = expand(
+    f"{R}/check/{{survey}}/classes.csv", survey=[s for s in TRAIN if s in CHECKED]
+)
+TRAININGS = [
+    *each_training(f"{R}/train/{{model}}/seed-{{seed}}/history.csv"),
+    *each_training(f"{R}/train/{{model}}/seed-{{seed}}/provenance.json"),
+]
+TUNINGS = [
+    *each_training(f"{R}/tune/{{model}}/seed-{{seed}}.json"),
+    *(tuned_file(model.name, seed) for model in settings.models for seed in settings.seeds),
+]
+SCORES = each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.json")
+TABLES = [f"{R}/tables/{name}.csv" for name in TABLE_NAMES]
+PROTOCOL = (
+    f"{GRID}, split {settings.split.train:.0%} / {settings.split.validation:.0%} / "
+    f"{settings.split.test:.0%} by stretch of line"
+)
+
+_planned = plan(Results(**{**gathered(), "models": {m.name: m.kind for m in settings.models}}))
+FIGURES = [drawing.name for drawing in _planned]
+MODEL_FIGURES = [drawing.name for drawing in _planned if drawing.models]
+ALL_PICTURES = [
+    *FIGURES,
+    *(f"clusters-{survey}" for survey in MAPPED),
+    *(f"prediction-{survey}" for survey in NEW),
+]
+RECORDS = [
+    *expand(f"{R}/check/{{survey}}/provenance.json", survey=CHECKED),
+    *expand(f"{R}/{{stage}}/{{survey}}/provenance.json", stage=["towers", "crops"], survey=TRAIN),
+    *expand(f"{R}/voxels/{{survey}}/{GRID}/provenance.json", survey=TRAIN),
+    f"{R}/split/provenance.json",
+    *each_training(f"{R}/train/{{model}}/seed-{{seed}}/provenance.json"),
+    *each_training(f"{R}/tune/{{model}}/seed-{{seed}}.provenance.json"),
+    *each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.provenance.json"),
+    *expand(f"{R}/models/{{model}}.provenance.json", model=[m.name for m in settings.models]),
+    *expand(f"{R}/predict/{{survey}}/provenance.json", survey=NEW),
+    f"{R}/tables/provenance.json",
+    f"{R}/figures/provenance.json",
+    f"{R}/mlflow/provenance.json",
+]

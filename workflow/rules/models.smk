@@ -1,0 +1,146 @@
+"""Models: training, threshold, best seed, scores (thesis 4.3 to 4.5, 5.2).
+
+A SCENE-Net is a JSON file and a CNN has its weights in safetensors. Snakemake has to know the names
+of outputs beforehand, so the rules that write models come in two forms that differ in nothing else.
+"""
+
+
+rule train:
+    input:
+        stores=VOXEL_STORES,
+        manifests=VOXEL_MANIFESTS,
+        split=f"{R}/split/split.csv",
+    output:
+        model=f"{R}/train/{{model}}/seed-{{seed}}/model.json",
+        history=f"{R}/train/{{model}}/seed-{{seed}}/history.csv",
+        provenance=f"{R}/train/{{model}}/seed-{{seed}}/provenance.json",
+    log:
+        f"{R}/logs/train/{{model}}-seed-{{seed}}.log",
+    benchmark:
+        f"{R}/benchmarks/train/{{model}}-seed-{{seed}}.tsv"
+    wildcard_constraints:
+        model=any_of(models_of("scenenet")),
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=600,
+    params:
+        job=lambda w: job(
+            "train",
+            model_settings(w.model),
+            seed=int(w.seed),
+            grid=SETTINGS["voxels"],
+        ),
+    message:
+        "Training {wildcards.model} from seed {wildcards.seed}"
+    script:
+        "../scripts/train.py"
+
+
+use rule train as train_cnn with:
+    output:
+        model=f"{R}/train/{{model}}/seed-{{seed}}/model.safetensors",
+        history=f"{R}/train/{{model}}/seed-{{seed}}/history.csv",
+        provenance=f"{R}/train/{{model}}/seed-{{seed}}/provenance.json",
+    wildcard_constraints:
+        model=any_of(models_of("cnn")),
+
+
+rule tune:
+    input:
+        model=f"{R}/train/{{model}}/seed-{{seed}}/model.json",
+        stores=VOXEL_STORES,
+        manifests=VOXEL_MANIFESTS,
+        split=f"{R}/split/split.csv",
+    output:
+        model=f"{R}/models/{{model}}/seed-{{seed}}.json",
+        tuning=f"{R}/tune/{{model}}/seed-{{seed}}.json",
+        provenance=f"{R}/tune/{{model}}/seed-{{seed}}.provenance.json",
+    log:
+        f"{R}/logs/tune/{{model}}-seed-{{seed}}.log",
+    benchmark:
+        f"{R}/benchmarks/tune/{{model}}-seed-{{seed}}.tsv"
+    wildcard_constraints:
+        model=any_of(models_of("scenenet")),
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=60,
+    params:
+        job=job("tune", SETTINGS["tuning"]),
+    message:
+        "Choosing the threshold of {wildcards.model} seed {wildcards.seed}"
+    script:
+        "../scripts/tune.py"
+
+
+use rule tune as tune_cnn with:
+    input:
+        model=f"{R}/train/{{model}}/seed-{{seed}}/model.safetensors",
+        stores=VOXEL_STORES,
+        manifests=VOXEL_MANIFESTS,
+        split=f"{R}/split/split.csv",
+    output:
+        model=f"{R}/models/{{model}}/seed-{{seed}}.safetensors",
+        tuning=f"{R}/tune/{{model}}/seed-{{seed}}.json",
+        provenance=f"{R}/tune/{{model}}/seed-{{seed}}.provenance.json",
+    wildcard_constraints:
+        model=any_of(models_of("cnn")),
+
+
+rule champion:
+    input:
+        models=lambda w: [tuned_file(w.model, seed) for seed in settings.seeds],
+        tunings=lambda w: [f"{R}/tune/{w.model}/seed-{seed}.json" for seed in settings.seeds],
+    output:
+        model=f"{R}/models/{{model}}.json",
+        provenance=f"{R}/models/{{model}}.provenance.json",
+    log:
+        f"{R}/logs/champion/{{model}}.log",
+    benchmark:
+        f"{R}/benchmarks/champion/{{model}}.tsv"
+    wildcard_constraints:
+        model=any_of(models_of("scenenet")),
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        job=job("champion", {}),
+    message:
+        "Picking the seed of {wildcards.model} that is best on validation"
+    script:
+        "../scripts/champion.py"
+
+
+use rule champion as champion_cnn with:
+    output:
+        model=f"{R}/models/{{model}}.safetensors",
+        provenance=f"{R}/models/{{model}}.provenance.json",
+    wildcard_constraints:
+        model=any_of(models_of("cnn")),
+
+
+rule evaluate:
+    input:
+        model=lambda w: tuned_file(w.model, w.seed),
+        stores=VOXEL_STORES,
+        manifests=VOXEL_MANIFESTS,
+        split=f"{R}/split/split.csv",
+    output:
+        scores=f"{R}/evaluate/{{model}}/seed-{{seed}}.json",
+        provenance=f"{R}/evaluate/{{model}}/seed-{{seed}}.provenance.json",
+    log:
+        f"{R}/logs/evaluate/{{model}}-seed-{{seed}}.log",
+    benchmark:
+        f"{R}/benchmarks/evaluate/{{model}}-seed-{{seed}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=120,
+    params:
+        job=job("evaluate", SETTINGS["detection"], part="test"),
+    message:
+        "Scoring {wildcards.model} seed {wildcards.seed} on the test crops"
+    script:
+        "../scripts/evaluate.py"

@@ -1,0 +1,33 @@
+"""Predictions: new surveys classified, with a list of their towers."""
+
+
+rule predict:
+    input:
+        survey=lambda w: source(w.survey),
+        model=champion_file(settings.predict.model),
+    output:
+        survey=f"{R}/predict/{{survey}}/{{survey}}.laz",
+        towers=f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
+        summary=f"{R}/predict/{{survey}}/{{survey}}.summary.json",
+        provenance=f"{R}/predict/{{survey}}/provenance.json",
+    log:
+        f"{R}/logs/predict/{{survey}}.log",
+    benchmark:
+        f"{R}/benchmarks/predict/{{survey}}.tsv"
+    wildcard_constraints:
+        survey=any_of(NEW),
+    threads: 2
+    resources:
+        mem_mb=4000,
+        runtime=240,
+    params:
+        job=lambda w: job(
+            "predict",
+            {name: value for name, value in SETTINGS["predict"].items() if name != "model"},
+            detection=SETTINGS["detection"],
+            input={"survey": source_print(w.survey)},
+        ),
+    message:
+        "Classifying {wildcards.survey}"
+    script:
+        "../scripts/predict.py"

@@ -1,0 +1,180 @@
+"""Tables, figures, the page, and all settings of the run."""
+
+
+rule resolved_config:
+    output:
+        config=f"{R}/config.yaml",
+    log:
+        f"{R}/logs/resolved_config.log",
+    benchmark:
+        f"{R}/benchmarks/resolved_config.tsv"
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        job=job("resolved_config", SETTINGS),
+    message:
+        "Writing down all settings of this run"
+    script:
+        "../scripts/resolved_config.py"
+
+
+rule tables:
+    input:
+        checks=CLASS_COUNTS,
+        towers=expand(f"{R}/towers/{{survey}}/towers.csv", survey=TRAIN),
+        grids=VOXEL_MANIFESTS,
+        trainings=TRAININGS,
+        tunings=TUNINGS,
+        scores=SCORES,
+        thesis=ancient(settings.thesis),
+    output:
+        tables=TABLES,
+        provenance=f"{R}/tables/provenance.json",
+    log:
+        f"{R}/logs/tables.log",
+    benchmark:
+        f"{R}/benchmarks/tables.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        job=job("tables", {}, results=gathered(), input=THESIS),
+    message:
+        "Writing the tables"
+    script:
+        "../scripts/tables.py"
+
+
+rule figures:
+    input:
+        stores=CROP_STORES,
+        manifests=CROP_MANIFESTS,
+        trainings=TRAININGS,
+        tunings=TUNINGS,
+        scores=SCORES,
+        thesis=ancient(settings.thesis),
+    output:
+        **pictures(FIGURES),
+        provenance=f"{R}/figures/provenance.json",
+    log:
+        f"{R}/logs/figures.log",
+    benchmark:
+        f"{R}/benchmarks/figures.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        job=job(
+            "figures",
+            {},
+            results=gathered(),
+            pictures=FIGURES,
+            sources={},
+            input=THESIS,
+        ),
+    message:
+        "Drawing the figures"
+    script:
+        "../scripts/figures.py"
+
+
+rule tower_map:
+    input:
+        survey=lambda w: source(w.survey),
+        towers=f"{R}/towers/{{survey}}/towers.csv",
+    output:
+        **pictures(["clusters-{survey}"]),
+        provenance=f"{R}/figures/clusters-{{survey}}.provenance.json",
+    log:
+        f"{R}/logs/tower_map/{{survey}}.log",
+    benchmark:
+        f"{R}/benchmarks/tower_map/{{survey}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        job=lambda w: job(
+            "figures",
+            SETTINGS["towers"],
+            results=gathered(models=[], surveys=[w.survey]),
+            pictures=[f"clusters-{w.survey}"],
+            sources={w.survey: [SURVEYS[w.survey].path, SURVEYS[w.survey].codes]},
+            input={"survey": source_print(w.survey)},
+        ),
+    message:
+        "Drawing the labelled towers of {wildcards.survey}"
+    script:
+        "../scripts/figures.py"
+
+
+rule prediction_map:
+    input:
+        survey=f"{R}/predict/{{survey}}/{{survey}}.laz",
+        towers=f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
+        summary=f"{R}/predict/{{survey}}/{{survey}}.summary.json",
+    output:
+        **pictures(["prediction-{survey}"]),
+        provenance=f"{R}/figures/prediction-{{survey}}.provenance.json",
+    log:
+        f"{R}/logs/prediction_map/{{survey}}.log",
+    benchmark:
+        f"{R}/benchmarks/prediction_map/{{survey}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        job=lambda w: job(
+            "figures",
+            {},
+            results=gathered(models=[], surveys=[], predicted=[w.survey]),
+            pictures=[f"prediction-{w.survey}"],
+            sources={},
+        ),
+    message:
+        "Drawing the prediction of {wildcards.survey}"
+    script:
+        "../scripts/figures.py"
+
+
+rule report:
+    input:
+        tables=TABLES,
+        pictures=[file for names in pictures(ALL_PICTURES).values() for file in names],
+        scores=SCORES,
+        tunings=TUNINGS,
+        checks=expand(f"{R}/check/{{survey}}/report.json", survey=CHECKED),
+        predictions=expand(
+            f"{R}/predict/{{survey}}/{{survey}}.{{part}}",
+            survey=NEW,
+            part=["towers.geojson", "summary.json"],
+        ),
+        records=RECORDS,
+        thesis=ancient(settings.thesis),
+    output:
+        report=f"{R}/report/index.html",
+        provenance=f"{R}/report/provenance.json",
+    log:
+        f"{R}/logs/report.log",
+    benchmark:
+        f"{R}/benchmarks/report.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        job=job(
+            "report",
+            {},
+            results=gathered(surveys=TRAIN, predicted=NEW),
+            input=THESIS,
+        ),
+    message:
+        "Writing the report"
+    script:
+        "../scripts/report.py"

@@ -1,0 +1,156 @@
+"""What every script of the workflow does before and after its one call of the package.
+
+A script defines a function from a job to nothing and hands it to ``run``. It imports the package
+inside of that function, so that whatever goes wrong, down to a missing library, is in the log.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "RAYON_NUM_THREADS",
+)
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job as Snakemake describes it; the configuration is no part of it, on purpose.
+
+    Attributes:
+        identity: the parameter ``job`` of the rule: stage, settings, code, and what else decides.
+        input, output: files by name; attribute access works as in Snakemake.
+        threads: how many it may use.
+    """
+
+    identity: Mapping[str, Any]
+    input: Any
+    output: Any
+    threads: int
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings of the stage, to build its model from."""
+        return dict(self.identity["settings"])
+
+    def made_by(self) -> dict[str, Any]:
+        """Settings, code and version, for a file that carries its own record."""
+        from scenenet.files import digest
+        from scenenet.provenance import package_version
+
+        return {
+            "config": digest(self.identity["settings"]),
+            "code": self.identity["code"],
+            "version": package_version(),
+        }
+
+    def record(self) -> dict[str, Any]:
+        """What the result was made from and by."""
+        from scenenet import provenance
+
+        made_by = self.made_by()
+        return provenance.record(
+            self.identity["stage"],
+            self.identity["settings"],
+            dict(self._input_prints()),
+            made_by["code"],
+            made_by["config"],
+            self.identity.get("seed"),
+        )
+
+    def _input_prints(self) -> Iterator[tuple[str, Any]]:
+        known = self.identity.get("input", {})
+        for name, files in self.input.items():
+            if name in known:
+                yield name, known[name]
+            elif name not in ("store", "stores"):  # their manifests speak for them
+                single = isinstance(files, str)
+                yield name, _print(files) if single else [_print(file) for file in files]
+
+
+def run(stage: Callable[[Job], object]) -> None:
+    """Call ``stage`` with the job that Snakemake started this process for, and write the record.
+
+    Standard output and error go to the log of the rule from the first moment on, those of other
+    processes and of compiled code included. Progress, which the package writes to ``sys.stderr``,
+    is shown on the terminal as well.
+    """
+    import __main__
+
+    snakemake = __main__.snakemake
+    log = _redirect(snakemake.log[0])
+    sys.excepthook = lambda kind, error, trace: _explain(log, kind, error, trace)
+    # Libraries read these when they are imported, so they come before any import of the package.
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, str(snakemake.threads)))
+    job = Job(snakemake.params.job, snakemake.input, snakemake.output, snakemake.threads)
+    stage(job)
+    record = getattr(job.output, "provenance", None)
+    if record is not None:
+        from scenenet.files import write_json
+
+        write_json(record, job.record())
+
+
+class _Both:
+    """A text stream into the log and onto the terminal."""
+
+    def __init__(self, *streams: TextIO) -> None:
+        self._streams = streams
+
+    def write(self, text: str) -> int:
+        for stream in self._streams:
+            stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        for stream in self._streams:
+            stream.flush()
+
+    def isatty(self) -> bool:
+        """Several jobs share the terminal, so there are lines and no bars."""
+        return False
+
+
+def _redirect(path: str) -> TextIO:
+    terminal = os.fdopen(os.dup(2), "w", buffering=1, encoding="utf-8")
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND, 0o644)
+    os.dup2(descriptor, 1)
+    os.dup2(descriptor, 2)
+    os.close(descriptor)
+    log = os.fdopen(1, "w", buffering=1, encoding="utf-8", closefd=False)
+    sys.stdout = log
+    sys.stderr = _Both(log, terminal)
+    logging.basicConfig(stream=log, level=logging.INFO, format="%(name)s: %(message)s")
+    logging.captureWarnings(True)
+    return log
+
+
+def _explain(log: TextIO, kind: type[BaseException], error: BaseException, trace: Any) -> None:
+    """The message is enough where the input is at fault; a traceback is for faults of the code."""
+    if kind.__name__ == "InputError":
+        print(f"Error: {error}", file=log)
+    else:
+        traceback.print_exception(kind, error, trace, file=log)
+    log.flush()
+
+
+def _print(path: str) -> str:
+    """Fingerprint of an input. Of a manifest, the digest of the data it stands for: the file also
+    holds the seconds that the work took."""
+    from scenenet.files import read_json
+    from scenenet.provenance import fingerprint
+
+    if Path(path).name == "manifest.json":
+        return f"content:{read_json(path)['content']}"
+    return fingerprint(path)

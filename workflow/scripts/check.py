@@ -1,0 +1,16 @@
+"""Report what is in a survey and what is odd about it."""
+
+import adapter
+
+
+def check(job: adapter.Job) -> None:
+    from scenenet.files import atomic, write_json
+    from scenenet.pointcloud.check import CheckSettings, check_survey
+
+    report = check_survey(job.input.survey, job.identity["codes"], CheckSettings(**job.settings))
+    write_json(job.output.report, report.to_dict())
+    with atomic(job.output.classes) as partial:
+        report.classes.to_csv(partial, index=False)
+
+
+adapter.run(check)

@@ -1,0 +1,15 @@
+"""Share the crops out to training, validation and test."""
+
+import adapter
+
+
+def split(job: adapter.Job) -> None:
+    from scenenet.files import atomic
+    from scenenet.split import SplitSettings, split_crops
+
+    table = split_crops(job.input.manifests, SplitSettings(**job.settings))
+    with atomic(job.output.split) as partial:
+        table.to_csv(partial, index=False)
+
+
+adapter.run(split)

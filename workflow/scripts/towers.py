@@ -1,0 +1,15 @@
+"""Find and measure the labelled towers of a survey."""
+
+import adapter
+
+
+def towers(job: adapter.Job) -> None:
+    from scenenet.files import atomic
+    from scenenet.towers import TowerSettings, survey_towers
+
+    table = survey_towers(job.input.survey, job.identity["codes"], TowerSettings(**job.settings))
+    with atomic(job.output.towers) as partial:
+        table.to_csv(partial, index=False)
+
+
+adapter.run(towers)

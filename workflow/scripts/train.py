@@ -1,0 +1,28 @@
+"""Train one model from one seed."""
+
+from pathlib import Path
+
+import adapter
+
+
+def train(job: adapter.Job) -> None:
+    from scenenet.protocol import ModelSettings
+    from scenenet.training import train
+    from scenenet.voxels import VoxelSettings
+
+    train(
+        job.input.manifests,
+        job.input.split,
+        ModelSettings(**job.settings),
+        job.identity["seed"],
+        job.output.model,
+        job.output.history,
+        # No output of the rule, so that it outlives a job that was stopped; it knows by itself
+        # which training it belongs to.
+        checkpoint=Path(job.output.history).with_name("checkpoint.safetensors"),
+        grid=VoxelSettings(**job.identity["grid"]),
+        provenance=job.made_by(),
+    )
+
+
+adapter.run(train)

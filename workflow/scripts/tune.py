@@ -1,0 +1,20 @@
+"""Choose the detection threshold of a trained model on the validation part."""
+
+import adapter
+
+
+def tune(job: adapter.Job) -> None:
+    from scenenet.protocol import TuningSettings
+    from scenenet.tuning import tune
+
+    tune(
+        job.input.model,
+        job.input.manifests,
+        job.input.split,
+        TuningSettings(**job.settings),
+        job.output.model,
+        job.output.tuning,
+    )
+
+
+adapter.run(tune)

@@ -6,8 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PROBABILITY_STEPS = 1000
-"""Thresholds are multiples of 1/1000: finer than any difference that shows in the scores."""
+THRESHOLDS = np.tanh(np.arange(1, 651) / 100)
+"""The thresholds that are tried, (650,), ascending; without 0, where everything would be a tower.
+
+They are evenly spaced in what the observer answers before tanh (thesis 4.3). An observer that sums
+up dozens of voxels has most of its probabilities above 0.99, where evenly spaced thresholds could
+not tell them apart; beyond the last one float32 cannot tell neighbours apart either.
+"""
 
 BETA = 0.5
 """Precision counts twice as much as recall (thesis 5.2.4.1)."""
@@ -87,10 +92,10 @@ def confusion(
 
 @dataclass(frozen=True)
 class ThresholdCurve:
-    """Confusions at every threshold 1/1000, 2/1000, ..., 1; curves of several samples add up.
+    """Confusions at every one of ``THRESHOLDS``; curves of several samples add up.
 
     Attributes:
-        true, false: (1001,) counts of tower and other voxels with probability in [i, i+1)/1000.
+        true, false: (651,) counts of tower and of other voxels that reach i of the thresholds.
     """
 
     true: np.ndarray
@@ -99,19 +104,19 @@ class ThresholdCurve:
     @classmethod
     def empty(cls) -> ThresholdCurve:
         """Of no voxels: where a sum begins."""
-        nothing = np.zeros(PROBABILITY_STEPS + 1, np.int64)
+        nothing = np.zeros(len(THRESHOLDS) + 1, np.int64)
         return cls(nothing, nothing)
 
     @classmethod
     def of(cls, probability: np.ndarray, tower: np.ndarray) -> ThresholdCurve:
         """From probabilities (V,) and truth (V,) bool; all voxels of the grid must be given."""
         # Compared in the probabilities' own type, as ``confusion`` does: 0.3 counts for 0.3.
-        taus = (np.arange(1, PROBABILITY_STEPS + 1) / PROBABILITY_STEPS).astype(probability.dtype)
+        taus = THRESHOLDS.astype(probability.dtype)
         # Most voxels are empty and have probability 0; they are counted and not sorted into bins.
         # What is not a number is no tower either.
         some = np.flatnonzero(probability > 0)
         bins, truth = np.searchsorted(taus, probability[some], side="right"), tower[some]
-        n = PROBABILITY_STEPS + 1
+        n = len(THRESHOLDS) + 1
         true, false = np.bincount(bins[truth], minlength=n), np.bincount(bins[~truth], minlength=n)
         n_tower = int(np.count_nonzero(tower))
         true[0] += n_tower - int(true.sum())
@@ -123,8 +128,8 @@ class ThresholdCurve:
 
     @property
     def tau(self) -> np.ndarray:
-        """(1000,) thresholds, ascending, without 0, at which everything would be a tower."""
-        return np.arange(1, PROBABILITY_STEPS + 1) / PROBABILITY_STEPS
+        """The thresholds, (650,), ascending."""
+        return THRESHOLDS
 
     def confusion(self, step: int) -> Confusion:
         """At ``tau[step]``."""
@@ -132,7 +137,7 @@ class ThresholdCurve:
         return Confusion(tp, fp, int(self.true.sum()) - tp, int(self.false.sum()) - fp)
 
     def precision_recall(self) -> tuple[np.ndarray, np.ndarray]:
-        """Precision and recall (1000,) at each tau; both 0 where nothing is detected."""
+        """Precision and recall (650,) at each tau; both 0 where nothing is detected."""
         tp = self.true[::-1].cumsum()[::-1][1:]
         fp = self.false[::-1].cumsum()[::-1][1:]
         detected = np.maximum(tp + fp, 1)

@@ -89,9 +89,13 @@ class StoreReader:
         import zarr
         from zarr.storage import ZipStore
 
-        self.manifest = read_json(manifest)
-        store = Path(manifest).parent / self.manifest["store"]
         remedy = "Delete its manifest and run again to make both anew"
+        try:
+            self.manifest = read_json(manifest)
+            store = Path(manifest).parent / self.manifest["store"]
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            problem = f"not a readable manifest ({type(error).__name__}: {error})"
+            raise InputError(problem, file=manifest, remedy=remedy) from None
         if not store.is_file():
             raise InputError("the store is missing", file=store, remedy=remedy)
         if sha256(store) != self.manifest["sha256"]:

@@ -125,6 +125,12 @@ def fit(
         begin = time.perf_counter()
         row = _epoch(model, optimiser, training, settings, weights, [seed, epoch])
         row["seconds"] = time.perf_counter() - begin
+        if not np.isfinite(row["loss"]):
+            raise InputError(
+                f"training {settings.name} from seed {seed} lost its way: the loss of epoch "
+                f"{epoch} is {row['loss']}",
+                remedy="Set a lower training.learning_rate",
+            )
         row |= _validate(model, validation, settings.measurement, weights)
         if isinstance(model, SceneNet):
             row |= model.shape_parameters()

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scenenet.crops import Crop, crop_of, read_crops
+from scenenet.errors import InputError
 from scenenet.progress import track
 from scenenet.store import StoreReader, create
 from scenenet.voxels import VoxelGrid, VoxelSample, VoxelSettings, voxelise
@@ -62,7 +63,7 @@ class Dataset:
 
     Attributes:
         samples, crops: of the same length, in the same order.
-        codes: class scheme of the labels.
+        codes: class scheme of the labels; several are joined by ``+``.
         content: digests of the stores the samples came from.
     """
 
@@ -76,17 +77,23 @@ def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Datase
     """Read samples back; all of them, or those with ``ids``.
 
     Raises:
-        InputError: a store does not match its manifest.
+        InputError: a store does not match its manifest, or a crop with one of ``ids`` is in none.
     """
-    samples, crops, contents, codes = [], [], [], "edp"
+    samples, crops, contents, codes = [], [], [], set()
     for path in manifests:
         reader = StoreReader(path)
         contents.append(reader.manifest["content"])
-        codes = reader.manifest["codes"]
+        codes.add(reader.manifest["codes"])
         for entry in reader.manifest["samples"]:
             if ids is not None and entry["id"] not in ids:
                 continue
             grid = VoxelGrid(tuple(entry["origin"]), entry["voxel_size"], tuple(entry["shape"]))
             samples.append(VoxelSample(entry["id"], grid, **reader.get(entry["id"])))
             crops.append(crop_of(entry))
-    return Dataset(samples, crops, codes, contents)
+    if ids is not None and (missing := ids - {sample.id for sample in samples}):
+        raise InputError(
+            f"{len(missing)} crops of the split are in no store: {', '.join(sorted(missing)[:5])}",
+            file=", ".join(str(path) for path in manifests),
+            remedy="Run the split again, and voxelise all of its surveys",
+        )
+    return Dataset(samples, crops, "+".join(sorted(codes)), contents)

@@ -8,7 +8,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from scenenet.metrics import Confusion, ThresholdCurve, TowerMatch, confusion, match_towers
+from scenenet.metrics import (
+    THRESHOLDS,
+    Confusion,
+    ThresholdCurve,
+    TowerMatch,
+    confusion,
+    match_towers,
+)
 
 # 2 tp, 1 fp, 4 fn, 13 tn of 20 voxels
 MOCK = Confusion(tp=2, fp=1, fn=4, tn=13)
@@ -74,8 +81,9 @@ def test_the_curve_is_the_direct_confusion_at_each_tau(prediction):
     probability, tower = prediction
     curve = ThresholdCurve.of(probability, tower)
     precision, recall = curve.precision_recall()
-    for step in {0, 1, 299, 300, 699, 998, 999, *np.clip(probability * 1000, 1, 1000).astype(int)}:
-        step = min(step, 999)
+    last = len(THRESHOLDS) - 1
+    beside = np.searchsorted(THRESHOLDS, probability).clip(1, last)
+    for step in {0, 1, 299, 300, last - 1, last, *beside.tolist(), *(beside - 1).tolist()}:
         direct = confusion(probability, tower, float(curve.tau[step]))
         assert curve.confusion(step) == direct
         assert (precision[step], recall[step]) == (direct.precision, direct.recall)
@@ -104,21 +112,27 @@ def test_tau_by_hand():
     curve = ThresholdCurve.of(probability, tower)
     # 0.8: P = 1, R = 2/3, F = 1.25 * 2/3 / (0.25 + 2/3) = 0.909; 0.6: P = 3/4, R = 1, F = 0.789
     tau, counts = curve.best()
-    assert tau == 0.8  # the highest of 0.701 ... 0.8, which are all as good
+    assert 0.79 < tau <= 0.8  # the highest of those above 0.7, which are all as good
     assert counts == Confusion(2, 0, 1, 2)
     assert counts.f05 == pytest.approx(0.9090909)
 
 
-def test_where_nothing_can_be_gained_tau_is_one():
+def test_where_nothing_can_be_gained_tau_is_the_highest():
     tau, counts = ThresholdCurve.of(np.array([0.9, 0.0]), np.array([False, True])).best()
-    assert tau == 1.0
+    assert tau == THRESHOLDS[-1]
     assert counts == Confusion(0, 0, 1, 1)
+
+
+def test_thresholds_differ_in_float32_and_none_is_zero_or_one():
+    single = THRESHOLDS.astype(np.float32)
+    assert (np.diff(single) > 0).all()
+    assert single[0] > 0 and single[-1] < 1
 
 
 def test_a_prediction_that_is_no_number_is_no_tower():
     nothing = np.full(3, np.nan, np.float32)
     tower = np.array([True, False, False])
-    assert ThresholdCurve.of(nothing, tower).confusion(999) == confusion(nothing, tower, 1.0)
+    assert ThresholdCurve.of(nothing, tower).confusion(0) == confusion(nothing, tower, 0.001)
 
 
 def test_average_precision_by_hand():

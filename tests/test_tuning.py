@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 
-import numpy as np
 import pytest
 
 from scenenet.files import read_json
-from scenenet.metrics import confusion
+from scenenet.metrics import THRESHOLDS, confusion
 from scenenet.modelfile import read_model, write_model
 from scenenet.models import CNN, SceneNet
 from scenenet.protocol import TuningSettings
@@ -34,10 +33,10 @@ def test_tau_is_where_f05_is_highest_on_validation(pole_finder, crops):
     _, tuned, result = choose(model, card, crops, TuningSettings())
     assert tuned.tau == result["tau"]
     assert result["validation"]["f05"] == pytest.approx(f05_at(model, crops, tuned.tau))
-    for tau in np.linspace(0.05, 1, 20):
+    for tau in THRESHOLDS[::40]:
         assert f05_at(model, crops, tau) <= result["validation"]["f05"]
     assert max(result["curve"]["f05"]) == result["validation"]["f05"]
-    assert len(result["curve"]["tau"]) == 1000
+    assert result["curve"]["tau"] == THRESHOLDS.tolist()
     assert result["validation"]["n_samples"] == 2
 
 
@@ -61,7 +60,7 @@ def test_the_size_it_was_trained_with_wins_a_tie(crops, pole_finder):
     chosen, tuned, result = choose(blind, card, crops, settings)
     assert chosen.kernel_size == (1, 1, 1)
     assert result["validation"]["f05"] == 0
-    assert tuned.tau == 1.0
+    assert tuned.tau == THRESHOLDS[-1]
 
 
 def test_a_cnn_has_no_other_size(crops, pole_finder):

@@ -1,8 +1,8 @@
 """The configuration of the workflow: gathers the settings models, which stand beside their stages.
 
 Nothing is set here that a stage has a setting for, and reading a configuration loads no torch, so
-that a workflow can plan in a second. ``python -m scenenet.config --schema FOLDER --reference FILE``
-writes the JSON schemas and the table of settings that are kept in the repository.
+that a workflow can plan in a second. ``scenenet.config_reference`` writes
+the JSON schemas and the table of settings that are kept in the repository.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
 from scenenet.inference import PredictSettings
 from scenenet.pointcloud.check import CheckSettings
+from scenenet.pointcloud.schemes import Codes
 from scenenet.protocol import ModelSettings, TrainingSettings, TuningSettings
 from scenenet.provenance import FULL_BELOW_BYTES
-from scenenet.settings import Settings
+from scenenet.settings import NAME, Settings
 from scenenet.split import SplitSettings
-from scenenet.surveys import NAME, Codes
 from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.towers import TowerSettings
 from scenenet.tracking.store import TrackingSettings
@@ -173,24 +173,3 @@ def merged(base: Mapping[str, Any], over: Any) -> Any:
         inner = both.get(key)
         both[key] = merged(inner, value) if isinstance(inner, Mapping) else value
     return both
-
-
-def main() -> None:
-    import argparse
-
-    from scenenet.config_reference import write_reference, write_schemas
-
-    parser = argparse.ArgumentParser(prog="python -m scenenet.config", description=__doc__)
-    parser.add_argument("--schema", metavar="FOLDER", help="write the JSON schemas into it")
-    parser.add_argument("--reference", metavar="FILE", help="write the table of settings to it")
-    chosen = parser.parse_args()
-    if chosen.schema is None and chosen.reference is None:
-        parser.error("say what to write: --schema, --reference or both")
-    if chosen.schema is not None:
-        write_schemas(chosen.schema)
-    if chosen.reference is not None:
-        write_reference(chosen.reference)
-
-
-if __name__ == "__main__":
-    main()

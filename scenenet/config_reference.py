@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -32,7 +33,7 @@ nowhere has the default below. `RESULTS_DIR/config.yaml` has all settings of a r
 | `surveys.tsv` | the survey sheet, see `docs/surveys.md` |
 | `thesis.yaml` | published numbers |
 
-This page is written by `python -m scenenet.config --reference config/README.md`.
+This page is written by `python -m scenenet.config_reference --reference config/README.md`.
 """
 
 SECTIONS: Mapping[str, type[BaseModel]] = {
@@ -90,3 +91,22 @@ def _default(field: FieldInfo) -> str:
     if model_in(field.annotation) is not None and not value:
         return "(none)"
     return f"`{json.dumps(value)}`"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(
+        prog="python -m scenenet.config_reference", description=__doc__
+    )
+    parser.add_argument("--schema", metavar="FOLDER", help="write the JSON schemas into it")
+    parser.add_argument("--reference", metavar="FILE", help="write the table of settings to it")
+    chosen = parser.parse_args()
+    if chosen.schema is None and chosen.reference is None:
+        parser.error("say what to write: --schema, --reference or both")
+    if chosen.schema is not None:
+        write_schemas(chosen.schema)
+    if chosen.reference is not None:
+        write_reference(chosen.reference)
+
+
+if __name__ == "__main__":
+    main()

@@ -21,7 +21,7 @@ class DetectionSettings(Settings):
         9.0, ge=0, description="m; thesis 5.1.2 has towers from 18 m, wooden poles begin at 9 m"
     )
     min_body: float = Field(
-        8.0,
+        6.0,
         ge=0,
         description="m from the lowest to the highest detected voxel: a tower is detected along "
         "its body, a treetop or a roof at one place",

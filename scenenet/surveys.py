@@ -12,18 +12,15 @@ from typing import TYPE_CHECKING, Literal, get_args
 from pydantic import Field
 
 from scenenet.errors import InputError
-from scenenet.pointcloud.schemes import SCHEMES
-from scenenet.settings import Settings
+from scenenet.pointcloud.schemes import SCHEMES, Codes
+from scenenet.settings import NAME, Settings
 
 if TYPE_CHECKING:
     from scenenet.config import Config
 
 Role = Literal["train", "new"]
-Codes = Literal["edp", "asprs", "ts40k"]
 Origin = Literal["file", "synthetic", "ts40k"]
 
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
-"""Survey names become file and folder names."""
 
 LAS_SUFFIXES = (".las", ".laz")
 SURVEY_SUFFIXES = (*LAS_SUFFIXES, ".npy", ".pt")

@@ -49,7 +49,8 @@ def test_the_shipped_configurations_write_to_different_folders_and_names(project
 def test_the_default_protocol_is_that_of_the_thesis(project_root):
     config = load(shipped(project_root, "config.yaml"))
     assert (config.split.train, config.split.validation, config.split.test) == (0.2, 0.1, 0.7)
-    for model in config.models:
+    for name in ("scenenet", "cnn"):
+        model = config.model_named(name)
         training, loss = model.training, model.training.loss
         assert (training.optimiser, training.learning_rate) == ("rmsprop", 0.001)
         assert (training.batch_size, training.epochs) == (8, 50)
@@ -146,7 +147,7 @@ def test_reading_a_configuration_loads_nothing_heavy():
 
 @pytest.mark.parametrize("name", ["config.schema.json", "surveys.schema.json"])
 def test_the_schemas_are_those_of_the_models(project_root, name):
-    remedy = "run: python -m scenenet.config --schema workflow/schemas"
+    remedy = "run: python -m scenenet.config_reference --schema workflow/schemas"
     written = read_json(project_root / "workflow" / "schemas" / name)
     assert written == config_reference.schemas()[name], remedy
 
@@ -160,7 +161,7 @@ def test_the_schema_takes_the_shipped_configuration_and_no_typo(project_root):
 
 
 def test_the_table_of_settings_is_that_of_the_models(project_root):
-    remedy = "run: python -m scenenet.config --reference config/README.md"
+    remedy = "run: python -m scenenet.config_reference --reference config/README.md"
     written = (project_root / "config" / "README.md").read_text(encoding="utf-8")
     assert written == config_reference.reference(), remedy
 

@@ -8,8 +8,8 @@ import pytest
 
 from scenenet.config import load
 from scenenet.errors import InputError
-from scenenet.pointcloud.schemes import SCHEMES
-from scenenet.surveys import Codes, Survey, file_name, read_surveys
+from scenenet.pointcloud.schemes import SCHEMES, Codes
+from scenenet.surveys import Survey, file_name, read_surveys
 
 HEADER = "survey\tpath\tcodes\trole"
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Literal
 
 import numpy as np
 
@@ -137,6 +138,9 @@ TS40K = ClassScheme(
     vegetation=frozenset({2, 3}),
     noise=frozenset({0}),
 )
+
+Codes = Literal["edp", "asprs", "ts40k"]
+"""The names of ``SCHEMES``, as settings take them."""
 
 SCHEMES: Mapping[str, ClassScheme] = MappingProxyType({"edp": EDP, "asprs": ASPRS, "ts40k": TS40K})
 

@@ -17,6 +17,9 @@ import typer
 
 from scenenet.errors import InputError
 
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
+
 app = typer.Typer(
     help="Find power-line towers in LiDAR surveys with SCENE-Net: eleven numbers with a meaning.",
     no_args_is_help=True,
@@ -255,9 +258,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)
-    except KeyboardInterrupt:
-        print("interrupted; nothing was left half-written", file=sys.stderr)
-        sys.exit(130)
+    except SystemExit as end:
+        if end.code == INTERRUPTED:  # typer ends so on Ctrl-C, without a word
+            print("interrupted; nothing was left half-written", file=sys.stderr)
+        raise
 
 
 def _cube(resolution: int) -> Any:

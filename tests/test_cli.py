@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -158,3 +160,23 @@ def test_a_survey_without_towers_is_not_trained_on(tmp_path):
 
 def test_the_command_line_knows_every_class_scheme():
     assert {codes.value for codes in Codes} == set(SCHEMES)
+
+
+def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path):
+    out = tmp_path / "out"
+    call = [sys.executable, "-c", "from scenenet.cli import main; main()", "predict", survey]
+    process = subprocess.Popen(
+        [*map(str, call), "--model", str(model), "--out", str(out)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        # Under some runners Ctrl-C is ignored, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    assert process.stderr is not None
+    said = process.stderr.readline()  # the survey has been read, the tiles come next
+    process.send_signal(signal.SIGINT)
+    said += process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert "interrupted" in said and "Traceback" not in said
+    assert [f.name for f in tmp_path.rglob("*") if f.is_file()] == []

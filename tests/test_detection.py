@@ -66,9 +66,9 @@ def test_a_bush_is_no_tower():
 
 
 def test_a_treetop_seen_at_one_place_is_no_tower_however_high():
-    top = column(0, 0, 15, 21)
+    top = column(0, 0, 15, 20)
     assert detect(top) == []
-    assert len(detect(top, min_body=6.0)) == 1
+    assert len(detect(top, min_body=5.0)) == 1
 
 
 def test_a_few_voxels_are_no_tower():

@@ -123,7 +123,7 @@ def train(
     kind: Annotated[Kind, typer.Option(help="Architecture.")] = Kind.scenenet,
     seeds: Annotated[int, typer.Option(min=1, help="Models to train; the best is kept.")] = 5,
     epochs: Annotated[int, typer.Option(min=1, help="Passes over the crops.")] = 150,
-    learning_rate: Annotated[float, typer.Option(help="Step size of RMSProp.")] = 0.01,
+    learning_rate: Annotated[float, typer.Option(min=1e-6, help="Step size of RMSProp.")] = 0.01,
     resolution: Annotated[
         int, typer.Option(help="Voxels an edge of a crop: 32, 64, 128, 256.")
     ] = 64,
@@ -136,8 +136,11 @@ def train(
     from scenenet.labelled import train_files
     from scenenet.protocol import ModelSettings, TrainingSettings, TuningSettings
 
+    ending = ".json" if kind is Kind.scenenet else ".safetensors"
+    if out.suffix != ending:
+        raise typer.BadParameter(f"a {kind} is kept in a {ending} file", param_hint="--out")
     training = TrainingSettings(epochs=epochs, learning_rate=learning_rate)
-    settings = ModelSettings(name=out.stem.lower() or kind, kind=kind, training=training)
+    settings = ModelSettings(name=kind.value, kind=kind.value, training=training)
     result = train_files(
         labelled,
         codes.value,
@@ -159,7 +162,7 @@ def predict(
     out: Annotated[Path, typer.Option("--out", help="Folder for the results.")],
     voxel_size: Annotated[
         float | None,
-        typer.Option(help="Edge of a voxel in m; as the model was trained if not given."),
+        typer.Option(min=0.01, help="Edge of a voxel in m; as the model was trained if not given."),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

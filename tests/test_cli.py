@@ -145,6 +145,9 @@ def test_wrong_calls_end_with_code_2(survey, tmp_path):
     odd = scenenet("train", survey, "--codes", "edp", "--out", tmp_path / "m.json",
                    "--resolution", 48)  # fmt: skip
     assert odd.returncode == 2
+    cnn = scenenet("train", survey, "--codes", "edp", "--out", tmp_path / "m.json", "--kind", "cnn")
+    assert cnn.returncode == 2
+    assert ".safetensors" in cnn.stderr
 
 
 def test_a_survey_without_towers_is_not_trained_on(tmp_path):

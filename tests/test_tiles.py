@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from scenenet.convolution import Occupancy
 from scenenet.errors import InputError
-from scenenet.inference import answer_tile
 from scenenet.models import CNN, SceneNet
+from scenenet.tile_answers import answer_tile
 from scenenet.tiles import EDGE, TileSpool, code_of, groups
 
 ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])

@@ -1,0 +1,216 @@
+"""What a model says of a survey, tile by tile, kept on disk; and the towers in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenenet.coverage import LOOK_M, edge_distance
+from scenenet.detection import DetectedTower, DetectionSettings, detect_towers
+from scenenet.progress import track
+from scenenet.tiles import EDGE, Tile, TileSpool, code_of, groups
+
+if TYPE_CHECKING:
+    from scenenet.modelfile import ModelCard
+    from scenenet.models import VoxelModel
+
+
+@dataclass(frozen=True)
+class TileAnswer:
+    """What a model says of the occupied voxels of a tile.
+
+    Attributes:
+        voxel: (M,) int32 positions within the tile, ascending.
+        probability: (M,) float32.
+        shares: (M, K) float32, part of each GENEO in the observer's answer: what it adds or takes,
+            divided by what all of them add and take. The absolute values sum to one. K is 0 for a
+            model without GENEOs.
+        tower: (M,) uint32 number of the tower it belongs to, 0 for none.
+    """
+
+    voxel: np.ndarray
+    probability: np.ndarray
+    shares: np.ndarray
+    tower: np.ndarray
+
+    def save(self, path: Path) -> None:
+        np.savez(path, **self.__dict__)
+
+    @classmethod
+    def read(cls, path: Path) -> TileAnswer:
+        with np.load(path, allow_pickle=False) as arrays:
+            return cls(**{name: arrays[name] for name in arrays.files})
+
+
+@dataclass(frozen=True)
+class SurveyTower:
+    """A tower of the list.
+
+    Attributes:
+        tower: where it is.
+        id: number in the list, from 1.
+        points: survey points in its voxels.
+        edge_distance: m to the edge of the data.
+        shares: (K,) mean part of each GENEO over its voxels.
+    """
+
+    tower: DetectedTower
+    id: int
+    points: int
+    edge_distance: float
+    shares: np.ndarray
+
+
+class TileAnswers:
+    """The answers of a model for every tile of a survey, kept on disk."""
+
+    def __init__(self, spool: TileSpool, folder: Path, n_shares: int) -> None:
+        self.spool = spool
+        self._folder = folder
+        self._n_shares = n_shares
+        self._cached = lru_cache(maxsize=64)(self._read)
+
+    def compute(self, model: VoxelModel, card: ModelCard, label: str) -> None:
+        """Run the model over all tiles."""
+        fullest = 1
+        if card.measurement == "density":
+            # One measure for the whole survey; one for each tile would show as seams.
+            fullest = max((int(tile.count.max()) for tile in self.spool.tiles()), default=1)
+        for tile in track(self.spool.tiles(), label, total=len(self.spool)):
+            probability, shares = answer_tile(self.spool, tile, model, card, fullest)
+            tower = np.zeros(len(tile.voxel), np.uint32)
+            TileAnswer(tile.voxel, probability, shares, tower).save(self._path(code_of(tile.place)))
+
+    def find_towers(self, tau: float, settings: DetectionSettings) -> list[SurveyTower]:
+        """Towers of the survey; their voxels get their number."""
+        zyx, probability, shares, count = [], [], [], []
+        for tile in self.spool.tiles():
+            answer = self._read(code_of(tile.place))
+            hits = answer.probability >= tau
+            zyx.append(tile.zyx()[hits])
+            probability.append(answer.probability[hits])
+            shares.append(answer.shares[hits])
+            count.append(tile.count[hits])
+        if not zyx:
+            return []
+        detected = np.concatenate(zyx)
+        centres = self.spool.centres(detected)
+        found = detect_towers(
+            centres,
+            np.concatenate(probability),
+            self._occupied_near(centres[:, :2], settings.foot_radius + settings.eps),
+            self.spool.voxel_size,
+            settings,
+        )
+        all_shares, counts = np.concatenate(shares), np.concatenate(count)
+        towers = []
+        for number, tower in enumerate(found, start=1):
+            place = np.array([tower.x, tower.y])
+            ground = self._occupied_near(place[None], LOOK_M * 1.5)[:, :2]
+            towers.append(
+                SurveyTower(
+                    tower,
+                    number,
+                    int(counts[tower.voxels].sum()),
+                    edge_distance(place, ground),
+                    all_shares[tower.voxels].mean(axis=0),
+                )
+            )
+            self._number(detected[tower.voxels], number)
+        return towers
+
+    def of_points(self, xyz: np.ndarray, geneos: list[str]) -> Mapping[str, np.ndarray]:
+        """The extra dimensions of points (n, 3) m, each (n,)."""
+        probability = np.zeros(len(xyz), np.float32)
+        tower = np.zeros(len(xyz), np.uint32)
+        shares = np.zeros((len(xyz), len(geneos)), np.float32)
+        codes, voxels = self.spool.locate(xyz)
+        for code, rows in groups(codes):
+            answer = self._cached(code)
+            at = np.searchsorted(answer.voxel, voxels[rows])
+            probability[rows] = answer.probability[at]
+            tower[rows] = answer.tower[at]
+            shares[rows] = answer.shares[at]
+        named = {f"share_{geneo}": shares[:, k] for k, geneo in enumerate(geneos)}
+        return {"tower_probability": probability, "tower_id": tower} | named
+
+    def _occupied_near(self, places: np.ndarray, distance: float) -> np.ndarray:
+        """(M, 3) m, middles of the occupied voxels within planar ``distance`` of places (P, 2)."""
+        from scipy.spatial import cKDTree
+
+        if len(places) == 0:
+            return np.empty((0, 3))
+        offset = places.mean(axis=0)
+        tree = cKDTree(places - offset)
+        near = [np.empty((0, 3))]
+        edge = EDGE * self.spool.voxel_size
+        for code in self._tiles_near(places, distance, edge):
+            centres = self.spool.centres(self.spool.tile(code).zyx())
+            apart, _ = tree.query(centres[:, :2] - offset, distance_upper_bound=distance)
+            near.append(centres[np.isfinite(apart)])
+        return np.concatenate(near)
+
+    def _tiles_near(self, places: np.ndarray, distance: float, edge: float) -> list[int]:
+        """Codes of the tiles whose plan comes within ``distance`` of a place."""
+        near = []
+        for code, place in self.spool.places():
+            low = np.array([place[2], place[1]]) * edge
+            outside = np.maximum(0, np.maximum(low - places, places - (low + edge)))
+            if (np.hypot(outside[:, 0], outside[:, 1]) <= distance).any():
+                near.append(code)
+        return near
+
+    def _number(self, zyx: np.ndarray, number: int) -> None:
+        """Write the number of a tower into its voxels (M, 3) on the lattice."""
+        codes, voxels = self.spool.locate(self.spool.centres(zyx))
+        for code, rows in groups(codes):
+            answer = self._read(code)
+            answer.tower[np.searchsorted(answer.voxel, voxels[rows])] = number
+            answer.save(self._path(code))
+
+    def _read(self, code: int) -> TileAnswer:
+        return TileAnswer.read(self._path(code))
+
+    def _path(self, code: int) -> Path:
+        return self._folder / f"{code}.npz"
+
+
+def answer_tile(
+    spool: TileSpool, tile: Tile, model: VoxelModel, card: ModelCard, fullest: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Probability (M,) and shares (M, K) at the occupied voxels of a tile.
+
+    The halo is as wide as the kernel reaches, so a voxel is answered as if there were no tiles.
+    """
+    import torch
+
+    from scenenet.convolution import Occupancy, convolve
+    from scenenet.models import SceneNet
+
+    kz, ky, kx = model.kernel_size
+    reach = kz // 2, ky // 2, kx // 2
+    shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
+    scene = spool.around(tile.place, reach)
+    density = card.measurement == "density"
+    phi = scene.count / fullest if density else np.ones(len(scene.count))
+    occupancy = Occupancy.of_grids([scene.voxel], [phi.astype(np.float32)], shape)
+    inner = tuple(slice(r, r + EDGE) for r in reach)
+    with torch.no_grad():
+        if isinstance(model, SceneNet):
+            parts = model.contributions(occupancy)[:, 0][:, *inner].reshape(len(model.names), -1)
+            parts = parts[:, tile.voxel]
+            observed = parts.sum(dim=0)
+            weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
+            shares = (parts / weight).T.contiguous().numpy()
+        else:
+            kernel, bias = model.observer()
+            answer = convolve(occupancy, kernel) + (0 if bias is None else bias)
+            observed = answer[0][inner].reshape(-1)[tile.voxel]
+            shares = np.empty((len(tile.voxel), 0), np.float32)
+        probability = torch.relu(torch.tanh(observed)).numpy()
+    return probability, shares

@@ -13,7 +13,7 @@ from pydantic import Field
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
 from scenenet.files import write_json
-from scenenet.pointcloud import add_dimensions, iter_chunks, survey_info
+from scenenet.pointcloud import add_dimensions, iter_chunks, survey_in_metres
 from scenenet.progress import track
 from scenenet.settings import Settings
 from scenenet.tile_answers import SurveyTower, TileAnswers
@@ -67,7 +67,7 @@ def predict_survey(
     tau = card.threshold()  # before the work: a model without one cannot say what a tower is
     geneos = trained.names if isinstance(trained, SceneNet) else []
     voxel_size = settings.voxel_size or card.voxel_size
-    name, crs = Path(path).name, survey_info(path).crs
+    name, crs = Path(path).name, survey_in_metres(path).crs
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
         spool = TileSpool(Path(scratch), voxel_size)
         n_points = 0

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from scenenet.pointcloud import iter_chunks
+from scenenet.pointcloud import iter_chunks, survey_in_metres
 from scenenet.pointcloud.samples import sample_files
 from scenenet.settings import Settings
 
@@ -39,6 +39,7 @@ def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> pd.D
     """
     samples = sample_files(path)
     if not samples:
+        survey_in_metres(path)
         return find_towers(_tower_points(path, codes), settings)
     tables = []
     for sample in samples:

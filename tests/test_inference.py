@@ -315,3 +315,14 @@ def test_a_real_survey_comes_back_field_by_field(real_prediction, real_data):
     equal_field_by_field(before, real_prediction.points)
     added = set(real_prediction.points.point_format.dimension_names)
     assert added - set(before.point_format.dimension_names) == set(ADDED)
+
+
+@pytest.mark.parametrize(("epsg", "said"), [(4326, "degrees"), (2229, "0.304801 m")])
+def test_a_survey_that_is_not_in_metres_is_refused(tmp_path, model, epsg, said):
+    """Sizes of voxels and towers are lengths."""
+    xyz = np.random.default_rng(0).uniform(0, 80, (50, 3))
+    crs = pyproj.CRS.from_epsg(epsg)
+    write_las(tmp_path / "far.laz", PointCloud(xyz, np.ones(50, np.uint8), crs=crs))
+    with pytest.raises(InputError, match=rf"far\.laz.*{said}.*Reproject"):
+        predict(tmp_path / "far.laz", model, tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []

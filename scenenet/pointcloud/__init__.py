@@ -6,7 +6,7 @@ from scenenet.pointcloud import check
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.extend import add_dimensions
 from scenenet.pointcloud.schemes import SCHEMES, ClassScheme, class_scheme
-from scenenet.pointcloud.survey import SurveyInfo, iter_chunks, read, survey_info
+from scenenet.pointcloud.survey import SurveyInfo, iter_chunks, read, survey_in_metres, survey_info
 from scenenet.pointcloud.write import write_las
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "class_scheme",
     "iter_chunks",
     "read",
+    "survey_in_metres",
     "survey_info",
     "write_las",
 ]

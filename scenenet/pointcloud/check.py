@@ -15,7 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from scenenet.pointcloud.cloud import PointCloud
-from scenenet.pointcloud.crs import CrsRecord, read_crs
+from scenenet.pointcloud.crs import CrsRecord, in_degrees, read_crs
 from scenenet.pointcloud.header import read_header
 from scenenet.pointcloud.kinds import kind_of
 from scenenet.pointcloud.las import class_codes, coordinates, iter_records
@@ -112,7 +112,7 @@ def check_survey(
     info = survey_info(path)
     header = read_header(path) if kind_of(path) == "las" else None
     told = CrsRecord(None, None) if header is None else read_crs(header.las)
-    degrees = _in_degrees(told, info.mins, info.maxs, info.scales)
+    degrees = in_degrees(told.crs, info.mins, info.maxs, info.scales)
     unit = told.unit_m or 1.0
     cell = settings.density_cell / (METRES_IN_A_DEGREE if degrees else unit)
     tally = Tally(
@@ -163,15 +163,6 @@ def _add(tally: Tally, xyz: np.ndarray, codes: np.ndarray) -> None:
     tally.maxs = np.maximum(tally.maxs, xyz.max(axis=0))
     tally.planar.add(xyz[:, 0], xyz[:, 1])
     tally.vertical.add(xyz[:, 2])
-
-
-def _in_degrees(told: CrsRecord, mins, maxs, scales) -> bool:
-    """Whether coordinates are degrees: the CRS says so or, without one, steps and range do."""
-    if told.crs is not None:
-        return bool(told.crs.is_geographic)
-    if scales is None or max(scales[:2]) > 1e-5:
-        return False
-    return max(map(abs, (mins[0], maxs[0]))) <= 180 and max(map(abs, (mins[1], maxs[1]))) <= 90
 
 
 def _count_stray(tally: Tally, settings: CheckSettings) -> int:

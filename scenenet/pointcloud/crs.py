@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -29,9 +30,28 @@ class CrsRecord:
     @property
     def unit_m(self) -> float | None:
         """Metres in one planar unit of the coordinates; None in degrees, or where unknown."""
-        if self.crs is None or self.crs.is_geographic or not self.crs.axis_info:
-            return None
-        return self.crs.axis_info[0].unit_conversion_factor
+        return unit_in_metres(self.crs)
+
+
+def unit_in_metres(crs: pyproj.CRS | None) -> float | None:
+    """Metres in one planar unit of a system; None for degrees, or where nothing is known."""
+    if crs is None or crs.is_geographic or not crs.axis_info:
+        return None
+    return crs.axis_info[0].unit_conversion_factor
+
+
+def in_degrees(
+    crs: pyproj.CRS | None,
+    mins: Sequence[float],
+    maxs: Sequence[float],
+    scales: Sequence[float] | None,
+) -> bool:
+    """Whether coordinates are degrees: the CRS says so or, without one, steps and range do."""
+    if crs is not None:
+        return bool(crs.is_geographic)
+    if scales is None or max(scales[:2]) > 1e-5:
+        return False
+    return max(map(abs, (mins[0], maxs[0]))) <= 180 and max(map(abs, (mins[1], maxs[1]))) <= 90
 
 
 def read_crs(header: laspy.LasHeader) -> CrsRecord:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenenet.errors import InputError
 from scenenet.pointcloud.cloud import PointCloud
-from scenenet.pointcloud.crs import read_crs
+from scenenet.pointcloud.crs import read_crs, unit_in_metres
 from scenenet.pointcloud.header import read_header
 from scenenet.pointcloud.kinds import kind_of
 from scenenet.pointcloud.las import class_codes, coordinates, iter_records
@@ -85,6 +86,29 @@ def survey_info(path: str | Path) -> SurveyInfo:
         extra_dimensions=tuple(las.point_format.extra_dimension_names),
         warnings=header.warnings if told.problem is None else (*header.warnings, told.problem),
     )
+
+
+def survey_in_metres(path: str | Path) -> SurveyInfo:
+    """The header of a survey whose coordinates are metres, as far as the file says.
+
+    Sizes of voxels, kernels and towers are lengths: in degrees or feet they would mean nothing.
+
+    Raises:
+        InputError: as ``survey_info``, and where the coordinates are known to be something else.
+    """
+    info = survey_info(path)
+    unit = unit_in_metres(info.crs)
+    # Only what the file says: small numbers without a CRS may be a local system in metres, and
+    # ``check`` warns of them.
+    degrees = info.crs is not None and info.crs.is_geographic
+    if degrees or unit not in (None, 1.0):
+        raise InputError(
+            "coordinates are degrees" if degrees else f"a unit of the coordinates is {unit:g} m",
+            file=path,
+            place=f"CRS {info.crs.name}" if info.crs else None,
+            remedy="Reproject it to metres first (pdal translate --filter filters.reprojection)",
+        )
+    return info
 
 
 def iter_chunks(

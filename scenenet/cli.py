@@ -133,8 +133,10 @@ def train(
     as_json: AsJson = False,
 ) -> None:
     """Train a model on labelled crops or surveys."""
+    from scenenet.files import digest
     from scenenet.labelled import train_files
     from scenenet.protocol import ModelSettings, TrainingSettings, TuningSettings
+    from scenenet.provenance import package_version
 
     ending = ".json" if kind is Kind.scenenet else ".safetensors"
     if out.suffix != ending:
@@ -149,7 +151,11 @@ def train(
         TuningSettings(kernel_sizes=((9, 7, 7), (9, 5, 5), (13, 7, 7))),
         range(seeds),
         validation,
-        {"files": [path.name for path in labelled]},
+        {
+            "config": digest(settings.model_dump()),
+            "version": package_version(),
+            "files": [path.name for path in labelled],
+        },
         out,
     )
     _answer(result, as_json, _training_lines)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, cast, get_args
 
 from pydantic import Field
 
@@ -195,7 +195,8 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
     if role == "new" and (root / path).is_dir():
         problems.append(f"{path} is a folder; samples in a folder can only be trained on")
     origin: Origin = "synthetic" if synthetic else "file"
-    return Survey(name, path, codes, role, origin), problems  # type: ignore[arg-type]
+    # A code or a role that is none is among the problems, with which no survey is used.
+    return Survey(name, path, cast(Codes, codes), cast(Role, role), origin), problems
 
 
 def _unknown(column: str, value: str, known: tuple[str, ...]) -> list[str]:

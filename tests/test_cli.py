@@ -46,6 +46,8 @@ def model(survey, tmp_path_factory) -> Path:
     assert answer["crops"] == {"training": 3, "validation": 1}
     assert len(answer["seeds"]) == 2
     assert "epochs" in made.stderr
+    made_by = json.loads(out.read_text())["provenance"]
+    assert {"seed", "data", "config", "version", "files"} <= made_by.keys()
     return out
 
 

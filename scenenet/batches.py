@@ -25,7 +25,8 @@ def batch(samples: Sequence[VoxelSample], measurement: Measurement) -> tuple[Occ
     towers = [
         b * volume + i[s.tower] for b, (s, i) in enumerate(zip(samples, indices, strict=True))
     ]
-    occupancy = Occupancy.of_grids(indices, [s.phi(measurement) for s in samples], shape)
+    phi = None if measurement == "presence" else [s.phi(measurement) for s in samples]
+    occupancy = Occupancy.of_grids(indices, phi, shape)
     return occupancy, np.concatenate([*towers, np.empty(0, np.int64)]).astype(np.int64)
 
 

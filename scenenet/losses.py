@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
+from scenenet.convolution import Occupancy
 from scenenet.models import SceneNet, VoxelModel
+from scenenet.observer import squared_error
 from scenenet.protocol import LossSettings
 
 
@@ -36,18 +39,18 @@ class VoxelWeights:
         return cls(empty / mean, tower / mean)
 
 
-def fidelity(prediction: Tensor, tower: Tensor, weights: VoxelWeights) -> Tensor:
-    """L_seg = mean of f_w(y) (M(x) - y)^2 over all voxels, empty ones included.
+def fidelity(
+    model: VoxelModel, occupancy: Occupancy, tower: np.ndarray, weights: VoxelWeights
+) -> Tensor:
+    """L_seg = mean of f_w(y) (M(x) - y)^2 over all voxels, empty ones included (thesis 4.5.1).
 
     Args:
-        prediction: (B, D, H, W) probabilities.
-        tower: (T,) int64, flat positions in ``prediction`` of the voxels whose target is 1.
+        occupancy: the batch.
+        tower: (T,) int64, ascending positions in (B, D, H, W) of the voxels whose target y is 1.
     """
-    flat = prediction.reshape(-1)
-    at_towers = flat[tower]
-    everywhere_empty = weights.empty * flat.square().sum()
-    correction = weights.tower * (at_towers - 1).square() - weights.empty * at_towers.square()
-    return (everywhere_empty + correction.sum()) / flat.numel()
+    kernel, bias = model.observer()
+    error = squared_error(occupancy, kernel, bias, tower, (weights.empty, weights.tower))
+    return error / occupancy.n_voxels
 
 
 def negativity(model: VoxelModel, settings: LossSettings) -> Tensor:

@@ -12,6 +12,7 @@ from torch import Tensor, nn
 from scenenet.convolution import Occupancy, convolve
 from scenenet.errors import InputError
 from scenenet.geneo import Lattice, kernel_named
+from scenenet.observer import observe
 from scenenet.protocol import THESIS_GENEOS, KernelSize, ModelSettings
 
 
@@ -32,10 +33,7 @@ class VoxelModel(nn.Module):
 
     def forward(self, occupancy: Occupancy) -> Tensor:
         """Probability of each voxel to hold a tower: (tanh(H(x)))_+, (B, D, H, W) in [0, 1]."""
-        kernel, bias = self.observer()
-        observed = convolve(occupancy, kernel)
-        # A SCENE-Net has no bias, and adding zero to a volume is a pass over it.
-        return torch.relu(torch.tanh(observed if bias is None else observed + bias))
+        return observe(occupancy, *self.observer())
 
     def n_parameters(self) -> int:
         """Number of trained numbers."""
@@ -99,7 +97,8 @@ class SceneNet(VoxelModel):
 
     def kernels(self) -> Tensor:
         """The sampled kernels, (K, kz, ky, kx), before mixing."""
-        lattice = Lattice.of_size(self.kernel_size)
+        device = next(self.parameters()).device
+        lattice = Lattice.of_size(self.kernel_size, device=device)
         return torch.stack(
             [
                 kernel_named(geneo).sample(lattice, self.shape_of(name))
@@ -115,8 +114,11 @@ class SceneNet(VoxelModel):
 
         Their sum over k is the observer's answer before tanh.
         """
-        weighted = self.mixing_weights()[:, None, None, None] * self.kernels()
-        return torch.stack([convolve(occupancy, kernel) for kernel in weighted])
+        return convolve(occupancy, self.weighted_kernels())
+
+    def weighted_kernels(self) -> Tensor:
+        """lambda_k g_k, (K, kz, ky, kx): the kernels whose sum is the observer's."""
+        return self.mixing_weights()[:, None, None, None] * self.kernels()
 
     def shape_parameters(self) -> dict[str, float]:
         """Every trained number and the derived last mixing weight, by a readable name."""

@@ -33,6 +33,9 @@ class TrainingSettings(Settings):
     batch_size: int = Field(8, ge=1, description="crops a step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
     learning_rate: float = Field(0.001, gt=0, description="step size of the optimiser")
+    device: Literal["cpu", "cuda"] = Field(
+        "cpu", description="where the steps are taken; cuda needs a GPU that torch can use"
+    )
     loss: LossSettings = LossSettings()
 
 

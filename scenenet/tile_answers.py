@@ -189,7 +189,7 @@ def answer_tile(
     """
     import torch
 
-    from scenenet.convolution import Occupancy, convolve
+    from scenenet.convolution import Occupancy, convolve_at_voxels
     from scenenet.models import SceneNet
 
     kz, ky, kx = model.kernel_size
@@ -197,20 +197,31 @@ def answer_tile(
     shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
     scene = spool.around(tile.place, reach)
     density = card.measurement == "density"
-    phi = scene.count / fullest if density else np.ones(len(scene.count))
-    occupancy = Occupancy.of_grids([scene.voxel], [phi.astype(np.float32)], shape)
-    inner = tuple(slice(r, r + EDGE) for r in reach)
+    phi = [(scene.count / fullest).astype(np.float32)] if density else None
+    occupancy = Occupancy.of_grids([scene.voxel], phi, shape)
+    inner = _inner(scene.voxel, shape, reach)
     with torch.no_grad():
         if isinstance(model, SceneNet):
-            parts = model.contributions(occupancy)[:, 0][:, *inner].reshape(len(model.names), -1)
-            parts = parts[:, tile.voxel]
+            parts = convolve_at_voxels(occupancy, model.weighted_kernels())[:, inner]
             observed = parts.sum(dim=0)
             weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
             shares = (parts / weight).T.contiguous().numpy()
         else:
             kernel, bias = model.observer()
-            answer = convolve(occupancy, kernel) + (0 if bias is None else bias)
-            observed = answer[0][inner].reshape(-1)[tile.voxel]
+            observed = convolve_at_voxels(occupancy, kernel[None])[0, inner]
+            observed = observed if bias is None else observed + bias
             shares = np.empty((len(tile.voxel), 0), np.float32)
         probability = torch.relu(torch.tanh(observed)).numpy()
     return probability, shares
+
+
+def _inner(
+    voxel: np.ndarray, shape: tuple[int, int, int], reach: tuple[int, int, int]
+) -> np.ndarray:
+    """Rows of ``voxel`` (M,), positions in a tile with its halo, that lie in the tile itself.
+
+    They come in the order of the tile's own voxels, as both are ascending.
+    """
+    zyx = np.unravel_index(voxel, shape)
+    inside = [(axis >= r) & (axis < r + EDGE) for axis, r in zip(zyx, reach, strict=True)]
+    return np.flatnonzero(inside[0] & inside[1] & inside[2])

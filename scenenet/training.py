@@ -16,14 +16,18 @@ from scenenet.batches import batch
 from scenenet.errors import InputError
 from scenenet.files import atomic, digest
 from scenenet.losses import VoxelWeights, fidelity, negativity
-from scenenet.metrics import ThresholdCurve
+from scenenet.metrics import THRESHOLDS, ThresholdCurve
 from scenenet.modelfile import ModelCard, write_model
 from scenenet.models import SceneNet, VoxelModel, new_model
+from scenenet.observer import count_reached
 from scenenet.progress import track
 from scenenet.protocol import Measurement, ModelSettings, TrainingSettings
 from scenenet.split import crops_in
 from scenenet.voxel_store import Dataset, load
 from scenenet.voxels import VoxelSample, VoxelSettings
+
+EVALUATED_AT_ONCE = 8
+"""Crops that are scored together: enough to keep the cores busy, few enough to need no memory."""
 
 OPTIMISERS = {"rmsprop": torch.optim.RMSprop, "adam": torch.optim.Adam, "sgd": torch.optim.SGD}
 
@@ -105,15 +109,20 @@ def fit(
         the model after the last epoch, and its history (see ``train``).
 
     Raises:
-        InputError: there is nothing to train on.
+        InputError: there is nothing to train on, or no GPU where one is asked for.
     """
     if not any(sample.tower.any() for sample in training):
         raise InputError(
             f"no tower voxel in the {len(training)} training crops",
             remedy="Add labelled crops, and check that their class scheme is the right one",
         )
-    model = new_model(settings, seed)
     protocol = settings.training
+    if protocol.device == "cuda" and not torch.cuda.is_available():
+        raise InputError(
+            f"{settings.name} is to be trained on a GPU, and torch finds none",
+            remedy="Set training.device to cpu, or install a torch that knows the GPU",
+        )
+    model = new_model(settings, seed).to(protocol.device)
     optimiser = OPTIMISERS[protocol.optimiser](model.parameters(), lr=protocol.learning_rate)
     n_tower = sum(int(sample.tower.sum()) for sample in training)
     n_voxels = sum(sample.grid.n_voxels for sample in training)
@@ -137,7 +146,7 @@ def fit(
         history.append({"epoch": epoch} | row)
         if checkpoint is not None:
             _save(checkpoint, identity, model, optimiser, history)
-    return model, pd.DataFrame(history)
+    return model.cpu(), pd.DataFrame(history)
 
 
 def threshold_curve(
@@ -145,8 +154,11 @@ def threshold_curve(
 ) -> ThresholdCurve:
     """Scores at every tau over all voxels of ``samples``, empty ones included."""
     total = ThresholdCurve.empty()
-    for sample in samples:
-        total += ThresholdCurve.of(*probabilities(model, sample, measurement))
+    with torch.no_grad():
+        kernel, bias = model.observer()
+        for start in range(0, len(samples), EVALUATED_AT_ONCE):
+            occupancy, towers = batch(samples[start : start + EVALUATED_AT_ONCE], measurement)
+            total += ThresholdCurve(*count_reached(occupancy, kernel, bias, towers, THRESHOLDS))
     return total
 
 
@@ -179,7 +191,7 @@ def _epoch(
         chosen = [training[i] for i in order[start : start + protocol.batch_size]]
         occupancy, towers = batch(chosen, settings.measurement)
         optimiser.zero_grad()
-        error = fidelity(model(occupancy), torch.from_numpy(towers), weights)
+        error = fidelity(model, occupancy, towers, weights)
         penalty = negativity(model, protocol.loss)
         loss = error + penalty
         loss.backward()
@@ -198,17 +210,16 @@ def _validate(
     """Loss and best F0.5 on the validation part; NaN where there is none."""
     if not validation:
         return {"validation_loss": float("nan"), "validation_f05": float("nan")}
-    curve = ThresholdCurve.empty()
-    losses, sizes = [], []
-    for sample in validation:
-        probability, truth = probabilities(model, sample, measurement)
-        curve += ThresholdCurve.of(probability, truth)
-        towers = torch.from_numpy(np.flatnonzero(truth))
-        losses.append(fidelity(torch.from_numpy(probability), towers, weights).item())
-        sizes.append(sample.grid.n_voxels)
+    errors, sizes = [], []
+    with torch.no_grad():
+        for start in range(0, len(validation), EVALUATED_AT_ONCE):
+            chosen = validation[start : start + EVALUATED_AT_ONCE]
+            occupancy, towers = batch(chosen, measurement)
+            errors.append(fidelity(model, occupancy, towers, weights).item())
+            sizes.append(occupancy.n_voxels)
     return {
-        "validation_loss": float(np.average(losses, weights=sizes)),
-        "validation_f05": curve.best()[1].f05,
+        "validation_loss": float(np.average(errors, weights=sizes)),
+        "validation_f05": threshold_curve(model, validation, measurement).best()[1].f05,
     }
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numba
 import numpy as np
 from pydantic import Field
 
+from scenenet.engine.options import COMPILED
 from scenenet.errors import InputError
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.protocol import Measurement
@@ -99,10 +102,8 @@ class VoxelGrid:
         Points on the upper border belong to the last voxel; others outside are clipped to the
         border, which happens through rounding alone where the grid was made for these points.
         """
-        steps = np.floor((xyz - np.asarray(self.origin)) / self.voxel_size).astype(np.int64)
         nz, ny, nx = self.shape
-        steps = steps.clip(0, np.array([nx, ny, nz]) - 1)
-        return (steps[:, 2] * ny + steps[:, 1]) * nx + steps[:, 0]
+        return _voxel_of(xyz, np.asarray(self.origin, float), self.voxel_size, nz, ny, nx)
 
     def centres(self, index: np.ndarray) -> np.ndarray:
         """(M, 3) xyz, m, of the middle of the voxels at flat ``index`` (M,)."""
@@ -148,13 +149,70 @@ def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSa
     Raises:
         InputError: the meaning of the class codes is not known.
     """
-    voxel = grid.voxel_of(cloud.xyz)
-    index, inverse, count = np.unique(voxel, return_inverse=True, return_counts=True)
-    towers = np.bincount(inverse, weights=cloud.is_tower, minlength=len(index))
-    return VoxelSample(sample_id, grid, index.astype(np.int32), count.astype(np.int32), towers > 0)
+    index, count, tower = _tally(grid.voxel_of(cloud.xyz), cloud.is_tower, grid.n_voxels)
+    return VoxelSample(sample_id, grid, index, count, tower)
 
 
 def _bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if len(xyz) == 0:
         raise InputError("there are no points to lay a grid over")
-    return xyz.min(axis=0), xyz.max(axis=0)
+    return _extremes(xyz)
+
+
+@numba.njit(**COMPILED)
+def _extremes(xyz):  # pragma: no cover - compiled
+    low, high = xyz[0].copy(), xyz[0].copy()
+    for i in range(len(xyz)):
+        for axis in range(3):
+            low[axis] = min(low[axis], xyz[i, axis])
+            high[axis] = max(high[axis], xyz[i, axis])
+    return low, high
+
+
+@numba.njit(**COMPILED)
+def _voxel_of(xyz, origin, voxel_size, nz, ny, nx):  # pragma: no cover - compiled
+    voxel = np.empty(len(xyz), np.int64)
+    for i in range(len(xyz)):
+        x = min(nx - 1, max(0, math.floor((xyz[i, 0] - origin[0]) / voxel_size)))
+        y = min(ny - 1, max(0, math.floor((xyz[i, 1] - origin[1]) / voxel_size)))
+        z = min(nz - 1, max(0, math.floor((xyz[i, 2] - origin[2]) / voxel_size)))
+        voxel[i] = (z * ny + y) * nx + x
+    return voxel
+
+
+@numba.njit(**COMPILED)
+def _tally(voxel, tower, n_voxels):  # pragma: no cover - compiled
+    """Occupied voxels, ascending, with their points and whether one of them is a tower's.
+
+    A bit a voxel says which are occupied. How many bits are set before one is its place in the
+    answer: no sorting, and no array as large as the grid but the bits.
+    """
+    one = np.uint64(1)
+    bits = np.zeros((n_voxels + 63) // 64, np.uint64)
+    for v in voxel:
+        bits[v >> 6] |= one << np.uint64(v & 63)
+    before = np.empty(len(bits), np.int64)
+    occupied = 0
+    for word in range(len(bits)):
+        before[word] = occupied
+        occupied += _ones(bits[word])
+    index = np.empty(occupied, np.int32)
+    count, found = np.zeros(occupied, np.int32), np.zeros(occupied, np.bool_)
+    for i in range(len(voxel)):
+        v = voxel[i]
+        below = bits[v >> 6] & ((one << np.uint64(v & 63)) - one)
+        place = before[v >> 6] + _ones(below)
+        index[place] = v
+        count[place] += 1
+        found[place] |= tower[i]
+    return index, count, found
+
+
+@numba.njit(**COMPILED)
+def _ones(word):  # pragma: no cover - compiled
+    """Bits set in an uint64: counted in pairs, then fours, then bytes, all at once."""
+    word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
+    fours = np.uint64(0x3333333333333333)
+    word = (word & fours) + ((word >> np.uint64(2)) & fours)
+    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+    return np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))

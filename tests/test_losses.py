@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from scenenet.convolution import Occupancy
 from scenenet.losses import VoxelWeights, fidelity, negativity
 from scenenet.models import CNN, SceneNet
 from scenenet.protocol import LossSettings
@@ -45,31 +47,35 @@ def test_weights_are_uniform_for_alpha_0(n_tower, n_voxels, epsilon):
     assert (weights.tower, weights.empty) == pytest.approx((1.0, 1.0))
 
 
-@given(st.integers(0, 99), st.sampled_from([0.0, 0.05, 1.0]))
+def scene(seed: int, share: float = 0.2) -> tuple[Occupancy, np.ndarray]:
+    """Two random grids and the positions of some of their voxels, as tower."""
+    rng = np.random.default_rng(seed)
+    indices = [np.flatnonzero(rng.random(60) < share) for _ in range(2)]
+    occupancy = Occupancy.of_grids(indices, None, (3, 4, 5))
+    flat = occupancy.flat()
+    return occupancy, flat[rng.random(len(flat)) < 0.3]
+
+
+@given(st.integers(0, 99), st.sampled_from([0.0, 0.2, 1.0]))
 def test_fidelity_is_the_mean_of_the_weighted_squared_error(seed, share):
-    generator = torch.Generator().manual_seed(seed)
-    prediction = torch.rand((2, 3, 4, 5), generator=generator, dtype=torch.float64)
-    truth = (torch.rand((2, 3, 4, 5), generator=generator) < share).double()
+    occupancy, tower = scene(seed, share)
     weights = VoxelWeights(empty=0.7, tower=9.0)
-    tower = torch.nonzero(truth.reshape(-1)).reshape(-1)
-    f_w = torch.where(truth > 0, weights.tower, weights.empty)
-    expected = (f_w * (prediction - truth) ** 2).mean()
-    torch.testing.assert_close(fidelity(prediction, tower, weights), expected)
+    model = SceneNet(kernel_size=(3, 3, 3), generator=torch.Generator().manual_seed(seed))
+    prediction = model(occupancy).reshape(-1)
+    truth = torch.zeros(occupancy.n_voxels)
+    truth[torch.from_numpy(tower)] = 1
+    expected = (torch.where(truth > 0, 9.0, 0.7) * (prediction - truth) ** 2).mean()
+    torch.testing.assert_close(fidelity(model, occupancy, tower, weights), expected)
 
 
-def test_fidelity_by_hand_and_its_gradient():
-    prediction = torch.tensor([[[[0.5, 0.25, 0.0, 1.0]]]], requires_grad=True)
-    loss = fidelity(prediction, torch.tensor([0]), VoxelWeights(empty=2.0, tower=8.0))
-    # (8 * 0.25 + 2 * 0.0625 + 0 + 2 * 1) / 4
-    assert loss.item() == pytest.approx(4.125 / 4)
-    loss.backward()
-    # 2 w (p - y) / 4
-    assert prediction.grad.flatten().tolist() == pytest.approx([-2.0, 0.25, 0.0, 1.0])
-
-
-def test_a_perfect_prediction_has_no_error():
-    truth = torch.tensor([[[[0.0, 1.0, 0.0]]]])
-    assert fidelity(truth, torch.tensor([1]), VoxelWeights(0.1, 9.0)).item() == 0.0
+def test_a_model_that_says_nothing_errs_by_the_weight_of_the_towers():
+    occupancy, tower = scene(1)
+    model = CNN(1, (3, 3, 3))
+    with torch.no_grad():
+        model.weight.zero_()
+        model.bias.fill_(-1.0)
+    loss = fidelity(model, occupancy, tower, VoxelWeights(empty=2.0, tower=8.0))
+    assert loss.item() == pytest.approx(8.0 * len(tower) / 120)
 
 
 POSITIVE = {

@@ -106,7 +106,7 @@ def test_the_contributions_are_the_mixing_weights_times_each_kernels_answer():
     with torch.no_grad():
         parts = model.contributions(scene)
         kernels, weights = model.kernels(), model.mixing_weights()
-        dense = scene.dense()[:, None]
+        dense = scene.dense(torch.float32)[:, None]
         answers = torch.nn.functional.conv3d(dense, kernels[:, None], padding="same")[0]
     assert parts.shape == (3, 1, *ROOM)
     torch.testing.assert_close(
@@ -119,7 +119,7 @@ def test_the_cnn_is_torchs_conv3d_summed():
     scene = occupancy(volume(5))
     with torch.no_grad():
         answers = torch.nn.functional.conv3d(
-            scene.dense()[:, None], model.weight[:, None], model.bias, padding="same"
+            scene.dense(torch.float32)[:, None], model.weight[:, None], model.bias, padding="same"
         )
         expected = answers.sum(dim=1).tanh().clamp(min=0)
         torch.testing.assert_close(model(scene), expected, rtol=0, atol=EXACT)

@@ -134,10 +134,11 @@ def seamless(spool: TileSpool, model, measurement: str) -> tuple[np.ndarray, np.
     low = zyx.min(axis=0)
     shape = tuple((zyx.max(axis=0) - low + 1).tolist())
     flat = np.ravel_multi_index(tuple((zyx - low).T), shape)
-    counts = np.array(list(voxels.values()))
+    counts, order = np.array(list(voxels.values())), np.argsort(flat)
     phi = counts / fullest if measurement == "density" else np.ones(len(flat))
     with torch.no_grad():
-        whole = model(Occupancy.of_grids([flat], [phi], shape)).numpy().ravel()[flat]
+        scene = Occupancy.of_grids([flat[order]], [phi[order]], shape)
+        whole = model(scene).numpy().ravel()[flat]
     return np.array([in_tiles[tuple(v)] for v in zyx.tolist()]), whole
 
 

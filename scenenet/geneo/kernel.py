@@ -48,11 +48,16 @@ class Lattice:
     planar_squared: Tensor
 
     @classmethod
-    def of_size(cls, size: tuple[int, int, int], dtype: torch.dtype = torch.float32) -> Lattice:
+    def of_size(
+        cls,
+        size: tuple[int, int, int],
+        dtype: torch.dtype = torch.float32,
+        device: torch.device | None = None,
+    ) -> Lattice:
         """The lattice of a kernel of ``size`` (kz, ky, kx), each at least 1."""
         if len(size) != 3 or min(size) < 1:
             raise ValueError(f"kernel size must be three positive integers, not {size}")
-        z, y, x = (torch.arange(k, dtype=dtype) - (k - 1) // 2 for k in size)
+        z, y, x = (torch.arange(k, dtype=dtype, device=device) - (k - 1) // 2 for k in size)
         planar = y[:, None] ** 2 + x[None, :] ** 2
         return cls(size, z[:, None, None], planar[None])
 

@@ -54,8 +54,8 @@ FEATURES = (
     VoxelFeature("area_4", "m^2", "the same within 4 m"),
     VoxelFeature("linearity_4", "1", "(l1 - l2) / l1 of the occupied voxels within 4 m"),
     VoxelFeature("planarity_4", "1", "(l2 - l3) / l1 of the same"),
-    VoxelFeature("verticality_2", "1", "|z| of the main axis of the occupied voxels within 2 m"),
-    VoxelFeature("points", "1", "log(1 + points / median of the occupied voxels)"),
+    VoxelFeature("verticality_4", "1", "|z| of their main axis"),
+    VoxelFeature("points_2", "1", "log(1 + points within 2 m / median of the occupied voxels)"),
     VoxelFeature("column_points", "1", "log(1 + points of its column / median of the columns)"),
     VoxelFeature("wire_distance", "m", "planar distance to the nearest wire-like voxel, up to 50"),
     VoxelFeature("wire_6", "m", "length of wire-like voxels within 6 m (planar)"),
@@ -70,6 +70,7 @@ RUN_GAP_M = 1.0
 STRAY_M, STRAY_NEIGHBOURS = 4.0, 3
 """With fewer others this near a voxel is a stray return (birds, sky), which tops are free of."""
 TALL_M = 3.0
+TOP_M = 0.7
 WIRE_LINEARITY, WIRE_VERTICALITY, WIRE_HEIGHT_M = 0.85, 0.5, 4.0
 """Linear, lying, and above bushes: wire-like."""
 FARTHEST_WIRE_M = 50.0
@@ -94,9 +95,9 @@ def voxel_features(sample: VoxelSample) -> np.ndarray:
         "area_4": far[:, 0] * face,
         "linearity_4": linearity,
         "planarity_4": planarity,
-        "verticality_2": _axes(near)[2],
+        "verticality_4": verticality,
     }
-    values |= scene.points(sample.count)
+    values |= scene.points(near[:, 10])
     values |= scene.wires(
         (linearity > WIRE_LINEARITY) & (verticality < WIRE_VERTICALITY) & (height > WIRE_HEIGHT_M)
     )
@@ -106,11 +107,13 @@ def voxel_features(sample: VoxelSample) -> np.ndarray:
 class _Scene(NamedTuple):
     """A sample spread out: occupied voxels (M,) and the grid they lie on.
 
-    ``solid`` (D, H, W) uint8 is where anything but a stray return is.
+    ``points_in`` (D, H, W) int32 holds how many points are where, and ``solid`` (D, H, W) uint8 is
+    where anything but a stray return is.
     """
 
     zyx: np.ndarray
     kept: np.ndarray
+    points_in: np.ndarray
     solid: np.ndarray
     voxel_size: float
 
@@ -118,9 +121,10 @@ class _Scene(NamedTuple):
     def of(cls, sample: VoxelSample) -> _Scene:
         shape = sample.grid.shape
         zyx = np.stack(np.unravel_index(sample.index, shape), axis=1).astype(np.int32)
-        solid = np.zeros(shape, np.uint8)
-        solid.reshape(-1)[sample.index] = 1
-        return cls(zyx, np.ones(len(zyx), bool), solid, sample.grid.voxel_size)
+        points = np.zeros(shape, np.int32)
+        points.reshape(-1)[sample.index] = sample.count
+        solid = (points > 0).astype(np.uint8)
+        return cls(zyx, np.ones(len(zyx), bool), points, solid, sample.grid.voxel_size)
 
     def without(self, stray: np.ndarray) -> _Scene:
         """The same without the voxels ``stray`` (M,), all of them kept if all are."""
@@ -140,9 +144,19 @@ class _Scene(NamedTuple):
         return raster[self.zyx[:, 1], self.zyx[:, 2]]
 
     def tops(self) -> np.ndarray:
-        """(H, W) m, upper face of the highest voxel of each column; NaN where it is empty."""
+        """(H, W) m, upper face of the highest voxel within ``TOP_M`` of each column.
+
+        In voxels below 0.7 m a wire counts for the columns beside it as well, so that it takes up
+        about as much of the surroundings as in voxels of 1 m. NaN where all these are empty.
+        """
         highest = self.solid.shape[0] - self.solid[::-1].argmax(axis=0)
-        return np.where(self.solid.any(axis=0), highest * self.voxel_size, np.nan)
+        tops = np.where(self.solid.any(axis=0), highest * self.voxel_size, -np.inf)
+        steps = _disk(TOP_M, self.voxel_size)
+        reach = int(np.abs(steps).max())
+        window = np.zeros((2 * reach + 1,) * 2, bool)
+        window[tuple((steps + reach).T)] = True
+        tops = ndimage.maximum_filter(tops, footprint=window, mode="constant", cval=-np.inf)
+        return np.where(np.isfinite(tops), tops, np.nan)
 
     def ground(self) -> np.ndarray:
         """(H, W) m above the grid's floor: lowest returns, freed of what stands on the ground.
@@ -159,8 +173,8 @@ class _Scene(NamedTuple):
         return ndimage.uniform_filter(opened, max(3, small), mode="nearest")
 
     def moments(self, radius: float) -> np.ndarray:
-        """(M, 10): number, sums and second moments of the occupied voxels within ``radius`` m."""
-        return _moments(self.solid, self.zyx, _ball(radius, self.voxel_size))
+        """(M, 11): number, sums, second moments and points of the voxels within ``radius`` m."""
+        return _moments(self.points_in, self.zyx, _ball(radius, self.voxel_size))
 
     def columns(self, ground: np.ndarray) -> dict[str, np.ndarray]:
         """What is above and below a voxel."""
@@ -210,12 +224,11 @@ class _Scene(NamedTuple):
             "tall_ring": look(stature, tall, 12.0, 6.0)[0],
         }
 
-    def points(self, count: np.ndarray) -> dict[str, np.ndarray]:
+    def points(self, near: np.ndarray) -> dict[str, np.ndarray]:
         """Numbers of points, in relation to the crop's: surveys differ in density."""
-        columns = np.zeros(self.solid.shape[1:])
-        np.add.at(columns, (self.zyx[:, 1], self.zyx[:, 2]), count)
+        columns = self.points_in.sum(axis=0)
         return {
-            "points": np.log1p(count / np.median(count)),
+            "points_2": np.log1p(near / np.median(near)),
             "column_points": np.log1p(self.at(columns) / np.median(columns[columns > 0])),
         }
 
@@ -278,17 +291,17 @@ def _axes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 @numba.njit(cache=True)
-def _moments(solid, zyx, steps):  # pragma: no cover - compiled
-    """(M, 10): n, z, y, x, zz, yy, xx, zy, zx, yx summed over the occupied voxels at ``steps``."""
-    depth, height, width = solid.shape
-    out = np.zeros((len(zyx), 10))
+def _moments(points, zyx, steps):  # pragma: no cover - compiled
+    """(M, 11): n, z, y, x, zz, yy, xx, zy, zx, yx, points, summed over the voxels at ``steps``."""
+    depth, height, width = points.shape
+    out = np.zeros((len(zyx), 11))
     for i in range(len(zyx)):
         for j in range(len(steps)):
             dz, dy, dx = steps[j, 0], steps[j, 1], steps[j, 2]
             z, y, x = zyx[i, 0] + dz, zyx[i, 1] + dy, zyx[i, 2] + dx
             if z < 0 or y < 0 or x < 0 or z >= depth or y >= height or x >= width:
                 continue
-            if solid[z, y, x]:
+            if points[z, y, x]:
                 out[i, 0] += 1
                 out[i, 1] += dz
                 out[i, 2] += dy
@@ -299,6 +312,7 @@ def _moments(solid, zyx, steps):  # pragma: no cover - compiled
                 out[i, 7] += dz * dy
                 out[i, 8] += dz * dx
                 out[i, 9] += dy * dx
+                out[i, 10] += points[z, y, x]
     return out
 
 

@@ -199,7 +199,7 @@ MEDIAN_OFF = {
     "mean_top_6": 2.0,
     "protrusion": 1.0,
     "wire_distance": 1.0,
-    "tall_6": 0.05,
+    "tall_6": 0.1,
     "linearity_4": 0.1,
 }
 """How far apart (m, 1) a voxel's feature and those of its parts, half its size, mostly are."""

@@ -34,13 +34,17 @@ FORMAT_VERSION = 1
 
 
 class BlackBoxSettings(Settings):
-    """How the trees are grown."""
+    """How the trees are grown.
 
-    trees: int = Field(100, ge=1, description="number of trees, each correcting the ones before")
-    learning_rate: float = Field(0.05, gt=0, le=1, description="share of each correction taken")
-    leaves: int = Field(8, ge=2, description="leaves a tree has at most")
+    Of some fifteen settings tried on real crops these had the highest F0.5 on training crops left
+    out, with the smallest spread over seeds. Many small steps matter most; the rest hardly does.
+    """
+
+    trees: int = Field(200, ge=1, description="number of trees, each correcting the ones before")
+    learning_rate: float = Field(0.025, gt=0, le=1, description="share of each correction taken")
+    leaves: int = Field(16, ge=2, description="leaves a tree has at most")
     leaf_voxels: int = Field(40, ge=1, description="training voxels that a leaf has at least")
-    l2: float = Field(0.0, ge=0, description="shrinkage of the leaves' values")
+    l2: float = Field(10.0, ge=0, description="shrinkage of the leaves' values")
     feature_share: float = Field(
         0.5, gt=0, le=1, description="share of the features that each split may choose from"
     )

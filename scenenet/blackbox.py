@@ -37,7 +37,8 @@ class BlackBoxSettings(Settings):
     """How the trees are grown.
 
     Of some fifteen settings tried on real crops these had the highest F0.5 on training crops left
-    out, with the smallest spread over seeds. Many small steps matter most; the rest hardly does.
+    out, or as good a one with a smaller spread over seeds. Fewer features a split, a quarter as
+    many leaves or lighter towers are worse; the other settings within a factor of two are not.
     """
 
     trees: int = Field(200, ge=1, description="number of trees, each correcting the ones before")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from scenenet.pointcloud.dimensions import checked, new_dimensions
 
 if TYPE_CHECKING:
     import laspy
+    import pyproj
 
 CHUNK_POINTS = 500_000
 INT32_MAX = np.iinfo(np.int32).max
@@ -57,28 +58,65 @@ def write_cloud(
     extra: Mapping[str, np.ndarray],
     scale: float,
 ) -> None:
-    import laspy
-
     arrays = checked(extra, dimensions, len(cloud))
-    header = laspy.LasHeader(version="1.4", point_format=6)
-    header.system_identifier, header.generating_software = "EXTRACTION", "scenenet"
-    header.creation_date = NO_DATE
-    header.scales, header.offsets = np.full(3, float(scale)), _offsets(path, cloud.xyz, scale)
+    header = _header(cloud.crs, _offsets(path, cloud.xyz, scale), scale)
     header.add_extra_dims(dimensions)
-    if cloud.crs is not None:
-        header.add_crs(cloud.crs)
     with open_writer(path, header) as writer:
         for at in range(0, len(cloud), CHUNK_POINTS):
             part = slice(at, at + CHUNK_POINTS)
-            n = len(cloud.xyz[part])
-            points = laspy.ScaleAwarePointRecord.zeros(n, header=writer.header)
-            for axis, name in enumerate("xyz"):
-                points[name][:] = cloud.xyz[part, axis]
-            points["classification"] = cloud.classification[part]
-            points["return_number"][:] = points["number_of_returns"][:] = 1
-            for name, values in arrays.items():
-                points[name] = values[part]
-            writer.write_points(points)
+            columns = {name: values[part] for name, values in arrays.items()}
+            _write_points(writer, cloud.xyz[part], cloud.classification[part], columns)
+
+
+@contextlib.contextmanager
+def las_stream(
+    path: str | Path, crs: pyproj.CRS | None, offsets: np.ndarray, scale: float = 0.001
+) -> Iterator[Callable[[np.ndarray, np.ndarray], None]]:
+    """Write a survey part by part, as ``write_las`` does a whole one.
+
+    Yields a function that takes the next points (N, 3) and their codes (N,).
+
+    Args:
+        offsets: (3,) m; points lie within 2^31 ``scale`` of it.
+    """
+    with open_writer(Path(path), _header(crs, offsets, scale)) as writer:
+
+        def write(xyz: np.ndarray, classification: np.ndarray) -> None:
+            for at in range(0, len(xyz), CHUNK_POINTS):
+                part = slice(at, at + CHUNK_POINTS)
+                _write_points(writer, xyz[part], classification[part], {})
+
+        yield write
+
+
+def _header(crs: pyproj.CRS | None, offsets: np.ndarray, scale: float) -> laspy.LasHeader:
+    import laspy
+
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.system_identifier, header.generating_software = "EXTRACTION", "scenenet"
+    header.creation_date = NO_DATE
+    header.scales, header.offsets = np.full(3, float(scale)), np.asarray(offsets, float)
+    if crs is not None:
+        header.add_crs(crs)
+    return header
+
+
+def _write_points(
+    writer: laspy.LasWriter,
+    xyz: np.ndarray,
+    classification: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+) -> None:
+    import laspy
+
+    points = laspy.ScaleAwarePointRecord.zeros(len(xyz), header=writer.header)
+    for axis, name in enumerate("xyz"):
+        points[name][:] = xyz[:, axis]
+    points["classification"] = classification
+    points["return_number"][:] = points["number_of_returns"][:] = 1
+    for name, values in columns.items():
+        points[name] = values
+    writer.write_points(points)
 
 
 @contextlib.contextmanager

@@ -8,10 +8,9 @@ from scenenet.synthetic.corridor import (
     TrueTower,
     corridor_cloud,
     make_corridor,
-    make_survey,
-    towers_geojson,
 )
 from scenenet.synthetic.settings import SyntheticSettings
+from scenenet.synthetic.survey import make_survey, towers_geojson
 
 __all__ = [
     "Corridor",

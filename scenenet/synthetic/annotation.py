@@ -1,8 +1,9 @@
 """How annotators label: the surroundings of a tower become tower (thesis 5.1.1).
 
 "Among these roughly 50% are mislabeled patches of ground. The maintenance personnel normally labels
-all 3D points near supporting towers". What is near is a box around the foot, some metres wide and
-up to a few metres high, the ends of the wires, and branches that touch the tower.
+all 3D points near supporting towers". In the public TS40K crops that is an upright prism around the
+tower, square and along the line, 1.9 m to each side: all in it that was not on the ground already
+is tower, which takes grass and scrub at the foot, the ends of the wires and branches that reach in.
 """
 
 from __future__ import annotations
@@ -11,10 +12,20 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scenenet.synthetic.codes import LOW, SCRUB, STRAY, TALL, TOWER, TREE, WIRE
 from scenenet.synthetic.line import TOWER as TOWER_STREAM
 from scenenet.synthetic.line import Support
 from scenenet.synthetic.noise import Raster, stream
-from scenenet.synthetic.scan import NOISE, TOWER, WIRE
+
+HALF_SIDE_M = 1.9
+"""Half the side of the prism at strength 0.5."""
+
+BESIDE_FOOT_M = 1.1
+"""The prism of a broad tower goes so far beyond its foot."""
+
+TAKEN = (SCRUB, TREE, LOW, TALL)
+GROUND_PATCH_M = 0.4
+"""Beyond strength 0.5 the ground itself becomes tower, up to this height."""
 
 
 def annotate(
@@ -31,7 +42,7 @@ def annotate(
     Args:
         towers: number and tower, for each that stands near the points.
         terrain: elevation of the ground, m.
-        strength: 0 the truth, 1 every tower in a wide and full patch.
+        strength: 0 the truth, 0.5 as in TS40K, 1 every tower in a wide prism with much ground.
         seed: seed of the survey; an annotator treats both sides of a tower alike, in whichever
             stretch they lie.
         rng: random numbers of this stretch.
@@ -41,25 +52,27 @@ def annotate(
         return labels
     for number, tower in towers:
         hand = stream(seed, TOWER_STREAM, number)
-        side = max(1.9, tower.structure.half_base + 1.1) * hand.uniform(0.8, 1.2) * (0.5 + strength)
-        ceiling = hand.uniform(0.4, 2.2) * (0.5 + strength)
-        coverage = min(1.0, hand.uniform(0.35, 1.0) * 2 * strength)
-        wire_end = hand.uniform(0.5, 2.5) * 2 * strength
-        branches = 0.4 * strength
-        reach = np.abs(tower.structure.attachments[:, 0]).max() + wire_end + side
+        side = max(HALF_SIDE_M, tower.structure.half_base + BESIDE_FOOT_M) * np.sqrt(2 * strength)
+        half_along, half_across = side * hand.uniform(0.9, 1.1, 2)
+        shift = hand.uniform(-0.2, 0.2, 2)
+        coverage = min(1.0, 2 * strength) * hand.uniform(0.92, 1.0)
+        patch = max(0.0, 2 * strength - 1) * hand.uniform(0.3, 0.9)
+        reach = side + 1.0 + np.abs(tower.structure.attachments[:, 0]).max()
         near = np.flatnonzero(
             (np.abs(xyz[:, 0] - tower.x) < reach) & (np.abs(xyz[:, 1] - tower.y) < reach)
         )
         points, classes = xyz[near], truth[near]
         dx, dy = points[:, 0] - tower.x, points[:, 1] - tower.y
-        above = points[:, 2] - terrain.bilinear(points[:, 0], points[:, 1])
+        cos, sin = np.cos(tower.azimuth), np.sin(tower.azimuth)
+        along, across = dx * cos + dy * sin - shift[0], dy * cos - dx * sin - shift[1]
         draw = rng.random(len(near))
-        solid = (classes != WIRE) & (classes != NOISE)
-        box = (np.abs(dx) < side) & (np.abs(dy) < side)
-        patch = solid & box & (above < ceiling) & (draw < coverage)
-        along = dx * np.cos(tower.azimuth) + dy * np.sin(tower.azimuth)
-        wire = (classes == WIRE) & (np.abs(along) < wire_end)
-        body = tower.structure.half_base + 0.6
-        branch = solid & (np.hypot(dx, dy) < body) & (above < tower.height) & (draw < branches)
-        labels[near[patch | wire | branch]] = TOWER
+        beside = (np.abs(along) < half_along) & (draw < coverage)
+        inside = beside & (np.abs(across) < half_across)
+        # Wires hold on at the arms, which may be wider than the prism.
+        taken = (inside & np.isin(classes, TAKEN)) | (beside & (classes == WIRE))
+        if patch:
+            above = points[:, 2] - terrain.bilinear(points[:, 0], points[:, 1])
+            low = inside & (above < GROUND_PATCH_M) & (classes != STRAY)
+            taken |= low & (rng.random(len(near)) < patch)
+        labels[near[taken]] = TOWER
     return labels

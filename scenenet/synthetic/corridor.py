@@ -1,31 +1,37 @@
-"""A whole synthetic corridor, made stretch by stretch, and the survey files of it."""
+"""A whole synthetic corridor, made stretch by stretch."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pyproj
 import pyproj.exceptions
 
 from scenenet.errors import InputError
-from scenenet.files import write_json
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.schemes import EDP
-from scenenet.progress import track
 from scenenet.synthetic.annotation import annotate
-from scenenet.synthetic.clutter import negatives, strays
-from scenenet.synthetic.line import STRETCH, Line, Support
+from scenenet.synthetic.clutter import clutter_points
+from scenenet.synthetic.codes import TOWER
+from scenenet.synthetic.cover import GroundCover
+from scenenet.synthetic.flight import Flight, flight_of
+from scenenet.synthetic.line import FOOT, STRETCH, Line, Support
 from scenenet.synthetic.noise import Raster, stream
-from scenenet.synthetic.scan import TOWER, WIRE, scan_surface
+from scenenet.synthetic.scan import Scanner
 from scenenet.synthetic.settings import SyntheticSettings
+from scenenet.synthetic.strays import stray_points
+from scenenet.synthetic.strip import Strip
 from scenenet.synthetic.structures import place, sample
 from scenenet.synthetic.terrain import Terrain
 from scenenet.synthetic.vegetation import WIDEST_CROWN_M, Vegetation, keep_clear
-from scenenet.synthetic.wires import string_wires
+from scenenet.synthetic.wires import other_cables, wire_points
+
+Coded = tuple[np.ndarray, np.ndarray]
+"""Points (N, 3) and their codes (N,)."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,8 @@ class Corridor:
         self.line = Line(settings, self.terrain)
         self.length = self.line.length
         self._vegetation = Vegetation(settings)
+        self._cover = GroundCover(settings)
+        self._scanner = Scanner(settings)
         self._origin = np.array([settings.easting, settings.northing, 0.0])
 
     def __len__(self) -> int:
@@ -101,61 +109,98 @@ class Corridor:
         for index in range(len(self)):
             yield self.stretch(index)
 
+    def stretches(self, workers: int = 1) -> Iterator[Stretch]:
+        """All stretches in order, made by ``workers`` threads; the same whatever their number.
+
+        As many stretches as there are workers, and two more, are in memory at a time.
+        """
+        if workers <= 1:
+            yield from self
+            return
+        with ThreadPoolExecutor(workers) as pool:
+            ahead: deque[Future[Stretch]] = deque()
+            for index in range(len(self)):
+                ahead.append(pool.submit(self.stretch, index))
+                if len(ahead) > workers + 1:
+                    yield ahead.popleft().result()
+            while ahead:
+                yield ahead.popleft().result()
+
     def stretch(self, index: int) -> Stretch:
         """Stretch ``index``, the same whichever others are made."""
         settings = self.settings
         rng = stream(settings.seed, STRETCH, index)
-        strip = self.line.strip(index)
         before, after = self.line.support(index), self.line.support(index + 1)
+        flight = flight_of(settings, int(self.line.flight[index]))
+        parts: list[Coded] = []
+        for number, strip in enumerate(self.line.strips(index)):
+            parts += self._strip_points(index, number, strip, before, after, flight, rng)
+        if index < settings.towers:
+            parts.append(self._tower_points(after, flight, rng))
+        xyz = np.concatenate([points for points, _ in parts])
+        truth = np.concatenate([codes for _, codes in parts])
+        ends = [(index, before), (index + 1, after)]
+        near = [(number, tower) for number, tower in ends if 1 <= number <= settings.towers]
+        labels = annotate(
+            xyz, truth, near, self._ground_near(near), settings.annotation_noise, settings.seed, rng
+        )
+        xyz += self._origin
+        return Stretch(index, xyz, labels, truth)
+
+    def _strip_points(
+        self,
+        index: int,
+        number: int,
+        strip: Strip,
+        before: Support,
+        after: Support,
+        flight: Flight,
+        rng: np.random.Generator,
+    ) -> list[Coded]:
+        settings = self.settings
         bounds = strip.bounds(reach=WIDEST_CROWN_M)
         terrain = self.terrain.raster(bounds)
         trees = self._vegetation.trees(bounds)
         across = strip.to_strip(trees.x, trees.y)[1]
         trees = keep_clear(trees, np.abs(across), settings.clearing)
         canopy = self._vegetation.canopy(bounds, trees)
-        masts, mast_codes, solid = negatives(strip, terrain, bounds, settings, rng)
-        parts = [
-            scan_surface(strip, terrain, canopy, solid, settings, rng),
-            strays(strip, terrain, settings, rng),
-            (masts, mast_codes),
-            self._wire_points(index, before, after, rng),
-        ]
-        if index < settings.towers:
-            parts.append(_tower_points(after, terrain, settings, rng))
-        xyz = np.concatenate([points for points, _ in parts])
-        truth = np.concatenate([codes for _, codes in parts])
+        solid = Raster.covering(bounds, canopy.top.step)
+        clutter = clutter_points(strip, terrain, solid, flight, settings, rng)
         ends = [(index, before), (index + 1, after)]
-        near = [(number, tower) for number, tower in ends if 1 <= number <= settings.towers]
-        labels = annotate(xyz, truth, near, terrain, settings.annotation_noise, settings.seed, rng)
-        xyz += self._origin
-        return Stretch(index, xyz, labels, truth)
-
-    def _wire_points(
-        self, index: int, before: Support, after: Support, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        settings, strip = self.settings, self.line.strip(index)
+        feet = [(t.x, t.y, self._unmown(k)) for k, t in ends if 1 <= k <= settings.towers]
+        cover = self._cover.within(bounds, canopy.top, feet)
         span = float(self.line.spans[index])
-        window = (strip.low / span, strip.high / span)
-        points = string_wires(
-            before.attachments,
-            after.attachments,
-            settings.catenary,
-            settings.wire_density,
-            rng,
-            window,
-        )
-        points += 0.5 * settings.ranging_noise * rng.standard_normal(points.shape)
-        return points, np.full(len(points), WIRE, np.uint8)
+        return [
+            self._scanner.scan(
+                strip, flight, terrain, canopy, solid, cover, key=2 * index + number
+            ),
+            clutter,
+            stray_points(strip, terrain, flight, settings, rng),
+            wire_points(strip, before, after, span, flight, settings, rng),
+            other_cables(strip, terrain, flight, settings, rng),
+        ]
 
+    def _tower_points(self, tower: Support, flight: Flight, rng: np.random.Generator) -> Coded:
+        settings = self.settings
+        density = settings.tower_density * flight.solids
+        points = sample(tower.structure.members, density, rng)
+        points = place(points, tower.x, tower.y, tower.base, tower.azimuth)
+        points += settings.ranging_noise * rng.standard_normal(points.shape)
+        above = points[:, 2] >= self.terrain.height(points[:, 0], points[:, 1])
+        return points[above], np.full(int(above.sum()), TOWER, np.uint8)
 
-def _tower_points(
-    tower: Support, terrain: Raster, settings: SyntheticSettings, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray]:
-    points = sample(tower.structure.members, settings.tower_density, rng)
-    points = place(points, tower.x, tower.y, tower.base, tower.azimuth)
-    points += settings.ranging_noise * rng.standard_normal(points.shape)
-    above = points[:, 2] >= terrain.bilinear(points[:, 0], points[:, 1])
-    return points[above], np.full(int(above.sum()), TOWER, np.uint8)
+    def _unmown(self, number: int) -> float:
+        """Share of low vegetation around tower ``number``, in both of its stretches."""
+        settings = self.settings
+        if settings.low_vegetation == 0:
+            return 0.0
+        return float(stream(settings.seed, FOOT, number).uniform(0.05, 0.6))
+
+    def _ground_near(self, towers: list[tuple[int, Support]]) -> Raster:
+        """Elevation of the ground around towers."""
+        reach = 12.0 + max((np.abs(t.structure.attachments).max() for _, t in towers), default=0.0)
+        x, y = ([getattr(tower, axis) for _, tower in towers] or [0.0] for axis in "xy")
+        return self.terrain.raster((min(x) - reach, min(y) - reach, max(x) + reach, max(y) + reach))
 
 
 def _crs(epsg: int) -> pyproj.CRS:
@@ -192,80 +237,11 @@ def corridor_cloud(
         The cloud as annotated, the true classes (N,) of its points, the true towers.
     """
     corridor = make_corridor(settings)
-    cloud, truth = _gather(corridor, iter(corridor))
-    return cloud, truth, corridor.towers
-
-
-def _gather(corridor: Corridor, stretches: Iterator[Stretch]) -> tuple[PointCloud, np.ndarray]:
-    parts = list(stretches)
+    parts = list(corridor)
     cloud = PointCloud(
         np.concatenate([part.xyz for part in parts]),
         np.concatenate([part.labels for part in parts]),
         EDP,
         corridor.crs,
     )
-    return cloud, np.concatenate([part.truth for part in parts])
-
-
-def make_survey(
-    settings: SyntheticSettings,
-    out: str | Path,
-    truth: str | Path | None = None,
-    towers: str | Path | None = None,
-    progress: str | None = None,
-) -> dict[str, Any]:
-    """Make a corridor and write it as a survey.
-
-    Args:
-        out: LAS or LAZ file with the labels as annotated, EDP codes.
-        truth: the same points in the same order with the labels before annotation noise.
-        towers: GeoJSON, a point per true tower: id, x, y, base, height, type.
-        progress: label under which progress is shown on stderr; None shows none.
-
-    Returns:
-        Counts: points, towers, length_m, classes (code -> points), and mislabelled: the share of
-        the points labelled tower that are none.
-
-    Raises:
-        InputError: a setting or path is at fault.
-    """
-    from scenenet.pointcloud import write_las
-
-    corridor = make_corridor(settings)
-    stretches = iter(corridor)
-    if progress is not None:
-        stretches = track(stretches, progress, total=len(corridor))
-    cloud, true_classes = _gather(corridor, stretches)
-    write_las(out, cloud)
-    if truth is not None:
-        write_las(truth, PointCloud(cloud.xyz, true_classes, EDP, corridor.crs))
-    found = corridor.towers
-    if towers is not None:
-        write_json(towers, towers_geojson(found, settings.epsg))
-    labelled = cloud.classification == TOWER
-    codes, counts = np.unique(cloud.classification, return_counts=True)
-    return {
-        "points": len(cloud),
-        "towers": len(found),
-        "length_m": round(corridor.length, 1),
-        "classes": {int(code): int(n) for code, n in zip(codes, counts, strict=True)},
-        "mislabelled": round(float((true_classes[labelled] != TOWER).mean()), 4),
-    }
-
-
-def towers_geojson(towers: list[TrueTower], epsg: int) -> dict[str, Any]:
-    """A GeoJSON feature collection with a point per tower; coordinates in the CRS it names."""
-    features = []
-    for tower in towers:
-        properties = {
-            "id": tower.id,
-            "x": round(tower.x, 3),
-            "y": round(tower.y, 3),
-            "base": round(tower.base, 3),
-            "height": round(tower.height, 3),
-            "type": tower.type,
-        }
-        point = {"type": "Point", "coordinates": [properties["x"], properties["y"]]}
-        features.append({"type": "Feature", "geometry": point, "properties": properties})
-    crs = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{epsg}"}}
-    return {"type": "FeatureCollection", "crs": crs, "features": features}
+    return cloud, np.concatenate([part.truth for part in parts]), corridor.towers

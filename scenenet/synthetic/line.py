@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from scenenet.synthetic.noise import stream
 from scenenet.synthetic.settings import SHORTEST_SHARE, SyntheticSettings
+from scenenet.synthetic.strip import Strip
 from scenenet.synthetic.structures import KINDS, Structure, place
 from scenenet.synthetic.terrain import Terrain
 
-Numbers = np.ndarray | float
-
-LINE, STRETCH, TOWER = 0, 1, 2
+LINE, STRETCH, TOWER, FLIGHT, FOOT = 0, 1, 2, 3, 4
 """First number of the key of a random stream: what it is for."""
 
 CLEARANCE_M = 5.0
 """Wires stay this far above the ground where the places for towers allow it."""
+
+FLIGHT_TOWERS = 6
+"""A helicopter keeps its height and speed over so many towers, where the survey has no gaps."""
 
 
 @dataclass(frozen=True)
@@ -45,66 +46,6 @@ class Support:
     attachments: np.ndarray
 
 
-@dataclass(frozen=True)
-class Strip:
-    """The ground of one stretch: |t| <= half_width and low + t k0 <= s <= high + t k1.
-
-    s runs along the span from its first tower, t to its left; borders at bends follow the bisector,
-    so that stretches neither overlap nor leave gaps.
-    """
-
-    x: float
-    y: float
-    azimuth: float
-    low: float
-    high: float
-    k0: float
-    k1: float
-    half_width: float
-
-    def holds(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which places (N,) on the map lie in the strip."""
-        s, t = self.to_strip(x, y)
-        between = (s >= self.low + t * self.k0) & (s < self.high + t * self.k1)
-        return between & (np.abs(t) <= self.half_width)
-
-    @property
-    def area(self) -> float:
-        """m^2."""
-        return 2 * self.half_width * (self.high - self.low)
-
-    def scatter(self, n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """x and y of about ``n`` places, uniform over the strip."""
-        w = self.half_width
-        first, last = self.low - abs(self.k0) * w, self.high + abs(self.k1) * w
-        n_box = rng.poisson(n * (last - first) / (self.high - self.low))
-        s, t = first + (last - first) * rng.random(n_box), w * (2 * rng.random(n_box) - 1)
-        if self.k0 or self.k1:
-            keep = (s >= self.low + t * self.k0) & (s < self.high + t * self.k1)
-            s, t = s[keep], t[keep]
-        return self.to_map(s, t)
-
-    def to_map(self, s: Numbers, t: Numbers) -> tuple[Any, Any]:
-        """x and y on the map of places given along and across the line; numbers or arrays."""
-        cos, sin = np.cos(self.azimuth), np.sin(self.azimuth)
-        return self.x + s * cos - t * sin, self.y + s * sin + t * cos
-
-    def to_strip(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Way along (s) and across (t, to the left) the line of places on the map (N,)."""
-        cos, sin = np.cos(self.azimuth), np.sin(self.azimuth)
-        dx, dy = x - self.x, y - self.y
-        return dx * cos + dy * sin, dy * cos - dx * sin
-
-    def bounds(self, reach: float = 0.0) -> tuple[float, float, float, float]:
-        """x min, y min, x max, y max of the strip, ``reach`` metres wider."""
-        w = self.half_width
-        t = np.array([-w, w, -w, w])
-        s = np.array([self.low, self.low, self.high, self.high])
-        s = s + t * np.array([self.k0, self.k0, self.k1, self.k1])
-        x, y = self.to_map(s, t)
-        return x.min() - reach, y.min() - reach, x.max() + reach, y.max() + reach
-
-
 class Line:
     """The towers of a line and, around them, its stretches.
 
@@ -129,12 +70,14 @@ class Line:
         turns = np.diff(headings)
         azimuths = np.r_[headings[0], headings[:-1] + turns / 2, headings[-1]]
         self._half_turns = np.r_[0.0, np.tan(turns / 2), 0.0]
+        self.flight, self._gap = _sections(n - 1, settings, rng)
         self._columns = (nodes, bases, heights, kinds, azimuths)
 
     @property
     def length(self) -> float:
-        """Length of the corridor along the line, m."""
-        return float(self.spans[1:-1].sum() + sum(self._ends()))
+        """Length of the corridor along the line, m; gaps are not counted."""
+        ends = 2 * np.minimum(self._settings.margin, 0.45 * self.spans[self._gap])
+        return float(self.spans[~self._gap].sum() + ends.sum() - self._beyond())
 
     @property
     def stretches(self) -> int:
@@ -151,25 +94,60 @@ class Line:
         held = place(structure.attachments, x, y, base, azimuth)
         return Support(x, y, base, height, str(kinds[k]), azimuth, structure, held)
 
-    def _ends(self) -> tuple[float, float]:
+    def _beyond(self) -> float:
+        """Of the ends of gaps, what belongs to the supports outside the corridor, m."""
         margin = self._settings.margin
-        return min(margin, 0.9 * self.spans[0]), min(margin, 0.9 * self.spans[-1])
+        return float(sum(min(margin, 0.45 * self.spans[k]) for k in (0, -1)))
 
-    def strip(self, k: int) -> Strip:
-        """Ground of stretch ``k``, between supports k and k + 1."""
+    def strips(self, k: int) -> list[Strip]:
+        """Ground of stretch ``k``, between supports k and k + 1: all of it, or at a gap of the
+        survey what lies near its towers."""
         span, last = float(self.spans[k]), self.stretches - 1
-        head, tail = self._ends()
+        if not self._gap[k]:
+            return [self._strip(k, 0.0, span)]
+        end = min(self._settings.margin, 0.45 * span)
+        strips = []
+        if k > 0:
+            strips.append(self._strip(k, 0.0, end))
+        if k < last:
+            strips.append(self._strip(k, span - end, span))
+        return strips
+
+    def _strip(self, k: int, low: float, high: float) -> Strip:
         return Strip(
             x=float(self.nodes[k, 0]),
             y=float(self.nodes[k, 1]),
             azimuth=float(self.headings[k]),
-            low=span - head if k == 0 else 0.0,
-            high=tail if k == last else span,
-            # Where the line turns left, the left side of both stretches is the shorter one.
-            k0=float(self._half_turns[k]),
-            k1=-float(self._half_turns[k + 1]),
+            low=low,
+            high=high,
+            # Where the line turns left, the left side of both stretches is the shorter one. Gaps
+            # are cut straight.
+            k0=float(self._half_turns[k]) if low == 0.0 else 0.0,
+            k1=-float(self._half_turns[k + 1]) if high == self.spans[k] else 0.0,
             half_width=self._settings.half_width,
         )
+
+
+def _sections(
+    n: int, settings: SyntheticSettings, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Number of the flight (n,) that scanned each stretch, and whether (n,) it is a gap.
+
+    The stretches before the first and behind the last tower are gaps: the survey ends there.
+    """
+    flight, gap = np.zeros(n, int), np.zeros(n, bool)
+    gap[[0, -1]] = True
+    mean = settings.section or FLIGHT_TOWERS
+    left, number = 0, -1
+    for k in range(n):
+        if left == 0:
+            # A section has two towers or more: they stand at its ends.
+            left = int(rng.integers(max(2, mean // 2), max(3, mean + mean // 2 + 1)))
+            number += 1
+            gap[k] |= settings.section > 0
+        flight[k] = number
+        left -= 1
+    return flight, gap
 
 
 def _headings(n: int, settings: SyntheticSettings, rng: np.random.Generator) -> np.ndarray:

@@ -1,170 +1,332 @@
-"""What a scanner that looks down gets back from ground and vegetation, and its class codes.
+"""What a scanner in a helicopter gets back from ground, vegetation and roofs.
 
-The codes follow what the public TS40K crops show when heights above the ground are compared by
-class: apart from thinned key points (2, 3, 4, 5) the returns of the ground stand in 10 and 19,
-those of low vegetation up to about 2 m in 11 and those of taller vegetation in 12. That, and not
-rails and roads, is what makes classes 10, 11 and 12 the bulk of thesis Table 5.1.
+Pulses fall in scan lines. Each comes from where the helicopter flies, down through the crowns: it
+returns from foliage that it meets, a few times at most, from a roof or wall, which ends it, or from
+the ground and what grows on it. So what lies behind a crown or a house is seen less or not at all.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+import numba
 import numpy as np
+from scipy.ndimage import gaussian_filter, maximum_filter
 
-from scenenet.synthetic.line import Strip
-from scenenet.synthetic.noise import Raster, field_seed, value_noise
+from scenenet.synthetic.codes import (
+    BARE,
+    BARE_TOO,
+    GRASS,
+    GROUND,
+    LOW,
+    SCRUB,
+    STRAY,
+    TALL,
+    TALL_M,
+    TREE,
+    UNCLASSIFIED,
+    WATER,
+)
+from scenenet.synthetic.cover import Cover
+from scenenet.synthetic.flight import Flight
+from scenenet.synthetic.noise import Raster, field_seed, next_state, uniform
 from scenenet.synthetic.settings import SyntheticSettings
+from scenenet.synthetic.strip import Strip
 from scenenet.synthetic.vegetation import Canopy
 
-UNCLASSIFIED, GROUND, LOW_VEGETATION, MEDIUM_VEGETATION, TREE, NOISE = 1, 2, 3, 4, 5, 7
-RAIL, ROAD, OVERLAP, TOWER, WIRE, OTHER = 10, 11, 12, 15, 16, 19
+STEP_M = 0.36
+"""Length of a step of a pulse through the crowns, downwards."""
 
-TALL_M = 2.0
-"""Vegetation above this height is tall."""
+MOST_RETURNS = 5
+"""Of one pulse."""
+
+GOES_ON = 0.42
+"""Share of the pulses that go on behind a return from foliage."""
+
+FOLIAGE = 64
+"""Side of the block of foliage, which repeats, in cells."""
+FOLIAGE_CELL_M = (0.28, 0.4, 0.4)
+"""Its cells, along z, y, x: branches spread sideways."""
+FOLIATED = 0.42
+"""Share of a crown that has foliage; the rest lies open."""
+
+CEILING_CELL_M = 4.0
+BLOCK_PULSES = 100_000
+"""Pulses that are worked on at a time: memory does not grow with the length of a span."""
 
 GRASS_M = 0.3
-"""Vegetation below this height has its key points in class 3, above it in class 4."""
-
-KEY_POINTS = 1.2
-"""Key points of the ground per m^2, whatever the density."""
-
-FIELD_STEP_M = 2.0
-
-ROAD_HALF_WIDTH_M = 2.2
+"""Low vegetation has its key points in class 3 below this height, above it in class 4."""
+WATER_RETURNS = 0.12
+"""Share of the pulses on water that come back."""
+BORDER_M = 0.5
+"""Beside the border of the corridor some tall returns were left unclassified."""
 
 
-@dataclass(frozen=True)
-class Ground:
-    """What the ground of a stretch is covered with: rasters of shares in [0, 1].
+class Scanner:
+    """The scanner of one survey."""
 
-    Attributes:
-        grass: returns near the ground that low vegetation gives.
-        tallness: how tall that vegetation is.
-        other: returns of the ground in class 19.
-        road: 1 on a road.
-    """
+    def __init__(self, settings: SyntheticSettings) -> None:
+        self._settings = settings
+        rng = np.random.default_rng(field_seed(settings.seed, "foliage"))
+        block = gaussian_filter(rng.standard_normal((FOLIAGE,) * 3), (1.1, 1.6, 1.6), mode="wrap")
+        self._foliage = block > np.quantile(block, 1 - FOLIATED)
+        per_metre = -np.log(np.clip(settings.penetration, 1e-3, 0.999)) / 5.0
+        self._hit = 1 - np.exp(-per_metre * STEP_M / FOLIATED)
 
-    grass: Raster
-    tallness: Raster
-    other: Raster
-    road: Raster
+    def scan(
+        self,
+        strip: Strip,
+        flight: Flight,
+        terrain: Raster,
+        canopy: Canopy,
+        solid: Raster,
+        cover: Cover,
+        key: int,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Points (N, 3) and codes (N,) of one strip.
 
-
-def ground_cover(settings: SyntheticSettings, bounds: tuple[float, float, float, float]) -> Ground:
-    """The cover of the ground within ``bounds`` (m), the same from whichever stretch one asks."""
-    rasters = [Raster.covering(bounds, FIELD_STEP_M) for _ in range(4)]
-    x, y = rasters[0].nodes()
-
-    def field(name: str, wavelength: float) -> np.ndarray:
-        return value_noise(x, y, wavelength, field_seed(settings.seed, name))
-
-    meadow = field("meadow", 30.0) + 0.6 * field("meadow detail", 7.0)
-    # Roads run where a slow field changes sign; divided by its slope that gives their distance.
-    way = field("road", 220.0)
-    slope = np.hypot(*np.gradient(way, FIELD_STEP_M))
-    road = np.abs(way) < ROAD_HALF_WIDTH_M * np.maximum(slope, 1e-4)
-    grass = np.clip(settings.low_vegetation * (1 + 1.3 * meadow), 0, 0.95)
-    rasters[0].values[:] = np.where(road, 0.02 * grass, grass)
-    rasters[1].values[:] = np.clip(0.5 + 0.6 * field("tallness", 18.0), 0, 1)
-    rasters[2].values[:] = np.clip(0.18 + 0.2 * field("other", 25.0), 0, 1)
-    rasters[3].values[:] = road
-    return Ground(*rasters)
-
-
-def scan_surface(
-    strip: Strip,
-    terrain: Raster,
-    canopy: Canopy,
-    solid: Raster,
-    settings: SyntheticSettings,
-    rng: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and codes (N,) of ground, vegetation and roofs in one stretch.
-
-    ``density`` pulses fall on each m^2. A pulse on a crown returns from its upper side, often from
-    within, and with the share ``penetration`` from the ground or the low vegetation below.
-
-    Args:
-        terrain: elevation of the ground, m.
-        canopy: what grows there.
-        solid: height of roofs above the ground, m; 0 where there is none.
-    """
-    x, y = strip.scatter(round(strip.area * settings.density), rng)
-    ground = terrain.bilinear(x, y)
-    cell = canopy.top.nearest(x, y)
-    top, bottom = canopy.top.values.ravel()[cell], canopy.bottom.values.ravel()[cell]
-    roof = solid.values.ravel()[solid.nearest(x, y)]
-    covered = np.flatnonzero((top > 0) & (roof == 0))
-    crown, height, crown_code = _crown_returns(covered, top, bottom, rng)
-    reaches = roof == 0
-    reaches[covered] = rng.random(len(covered)) < settings.penetration
-    below = np.flatnonzero(reaches)
-    low, low_code = _low_returns(strip, x[below], y[below], settings, rng)
-    roofs = np.flatnonzero(roof)
-    which = np.concatenate((below, crown, roofs))
-    above = np.concatenate((low, height, roof[roofs]))
-    z = ground[which] + above + settings.ranging_noise * rng.standard_normal(len(which))
-    code = np.concatenate((low_code, crown_code, np.full(len(roofs), UNCLASSIFIED, np.uint8)))
-    return np.column_stack((x[which], y[which], z)), code
-
-
-def _low_returns(
-    strip: Strip,
-    x: np.ndarray,
-    y: np.ndarray,
-    settings: SyntheticSettings,
-    rng: np.random.Generator,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Height above the ground (N,) and code (N,) of pulses that get near the ground."""
-    cover = ground_cover(settings, strip.bounds())
-    at = cover.grass.nearest(x, y)
-    height = np.zeros(len(x))
-    draw = rng.random(len(x))
-    code = np.where(draw < cover.other.values.ravel()[at], np.uint8(OTHER), np.uint8(RAIL))
-    code[draw > 1 - KEY_POINTS / max(settings.density, 2 * KEY_POINTS)] = GROUND
-    code[(cover.road.values.ravel()[at] > 0) & (code == RAIL)] = ROAD
-    grown = np.flatnonzero(rng.random(len(x)) < cover.grass.values.ravel()[at])
-    # Mostly grass, in places scrub of a metre or more.
-    scale = 0.08 + 0.9 * cover.tallness.values.ravel()[at[grown]] ** 3
-    tall = scale * rng.standard_exponential(len(grown))
-    over = np.flatnonzero(tall >= TALL_M)
-    tall[over] = TALL_M * rng.random(len(over))
-    height[grown] = tall
-    code[grown] = _vegetation_codes(tall, rng)
-    return height, code
+        Args:
+            terrain: elevation of the ground, m.
+            canopy: what grows there.
+            solid: height of roofs above the ground, m; 0 where there is none. Its cells are those
+                of the canopy.
+            key: a number of this strip, for its random numbers.
+        """
+        settings = self._settings
+        x, y = canopy.top.nodes()
+        ground = terrain.bilinear(x.ravel(), y.ravel()).reshape(x.shape)
+        top = np.where(canopy.top.values > 0, ground + canopy.top.values, -np.inf)
+        bottom = ground + canopy.bottom.values
+        roof = np.where(solid.values > 0, ground + solid.values, -np.inf)
+        # Side by side in memory: a pulse looks at all four of a cell.
+        columns = np.stack(
+            [top, bottom, roof, canopy.leaves.values],
+            axis=-1,
+            dtype=np.float32,
+            casting="same_kind",
+        )
+        tallest = np.maximum(canopy.top.values, solid.values)
+        # How far a pulse can come from across on its way down through the tallest tree.
+        lean = (strip.half_width + abs(flight.offset)) / flight.height
+        reach = lean * float(tallest.max())
+        ceiling, ci, cj = _ceiling(tallest, canopy.top, reach)
+        marked = np.zeros((3, *terrain.values.shape), np.bool_)
+        frame = np.array(
+            [strip.x, strip.y, np.cos(strip.azimuth), np.sin(strip.azimuth), strip.low, strip.high,
+             strip.k0, strip.k1, strip.half_width]
+        )  # fmt: skip
+        points, codes = [], []
+        for number, (start, end) in enumerate(flight.passes):
+            lines = int((strip.last - strip.first + 2 * abs(flight.skew) * strip.half_width)
+                        / flight.line_step) + 2  # fmt: skip
+            # Pulses that come down outside may have met a crown inside.
+            start, end = start - reach, end + reach
+            pulses = int((end - start) / flight.pulse_step) + 1
+            per_block = max(1, BLOCK_PULSES // pulses)
+            path = np.array(
+                [strip.first - abs(flight.skew) * strip.half_width, start, flight.line_step,
+                 flight.pulse_step, flight.skew, flight.sway, flight.offset, flight.height]
+            )  # fmt: skip
+            seed = np.uint64(field_seed(settings.seed, f"pulses {key} {number}"))
+            for first in range(0, lines, per_block):
+                last = min(first + per_block, lines)
+                xyz = np.empty(((last - first) * pulses * (MOST_RETURNS + 1), 3))
+                code = np.empty(len(xyz), np.uint8)
+                n = _sweep(
+                    first, last, pulses, seed, frame, path,
+                    terrain.values, terrain.i, terrain.j,
+                    columns, flight.depths, canopy.top.i, canopy.top.j, canopy.top.step,
+                    ceiling, ci, cj, self._foliage, self._hit,
+                    cover.grass.values, cover.tallness.values, cover.rise.values,
+                    cover.water.values, cover.grass.i, cover.grass.j, cover.grass.step,
+                    settings.ranging_noise, marked, xyz, code,
+                )  # fmt: skip
+                points.append(xyz[:n].copy())
+                codes.append(code[:n].copy())
+        return np.concatenate(points), np.concatenate(codes)
 
 
-def _crown_returns(
-    covered: np.ndarray, top: np.ndarray, bottom: np.ndarray, rng: np.random.Generator
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pulse (R,), height above the ground (R,) and code (R,) of the returns from crowns."""
-    top, bottom = top[covered], bottom[covered]
-    depth = top - bottom
-    n = len(covered)
-    first = rng.random(n) < 0.92
-    # Deep crowns return more than once, bushes hardly ever.
-    more = rng.random(n) < 0.8 * depth / (depth + 2.0)
-    third = more & (rng.random(n) < 0.35)
-    outer = top[first] - np.minimum(
-        rng.standard_exponential(int(first.sum())) * (0.15 + 0.12 * depth[first]), depth[first]
-    )
-    inner = [bottom[m] + depth[m] * rng.random(int(m.sum())) for m in (more, third)]
-    which = np.concatenate((covered[first], covered[more], covered[third]))
-    height = np.concatenate((outer, *inner))
-    # A few returns come from the stem and from dead branches below the crown.
-    stem = rng.random(len(height)) < 0.04
-    height[stem] *= rng.random(int(stem.sum()))
-    return which, height, _vegetation_codes(height, rng)
+def _ceiling(tallest: np.ndarray, raster: Raster, reach: float) -> tuple[np.ndarray, int, int]:
+    """Greatest height above the ground within ``reach`` of each cell of ``CEILING_CELL_M``."""
+    per = round(CEILING_CELL_M / raster.step)
+    i0, j0 = raster.i // per, raster.j // per
+    rows = (raster.j + tallest.shape[0] - 1) // per - j0 + 1
+    columns = (raster.i + tallest.shape[1] - 1) // per - i0 + 1
+    full = np.zeros((rows * per, columns * per))
+    r, c = raster.j - j0 * per, raster.i - i0 * per
+    full[r : r + tallest.shape[0], c : c + tallest.shape[1]] = tallest
+    ceiling = full.reshape(rows, per, columns, per).max(axis=(1, 3))
+    # Cells around: a pulse enters from the side.
+    size = 2 * int(np.ceil(reach / CEILING_CELL_M)) + 1
+    return maximum_filter(ceiling, size), i0, j0
 
 
-def _vegetation_codes(height: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Codes (N,) of returns from vegetation at ``height`` (N,) m above the ground."""
-    draw = rng.random(len(height))
-    key_point = np.where(height < GRASS_M, np.uint8(LOW_VEGETATION), np.uint8(MEDIUM_VEGETATION))
-    low = np.where(draw < 0.03, key_point, np.uint8(ROAD))
-    tall = np.full(len(height), OVERLAP, np.uint8)
-    tall[draw < 0.07] = TREE
-    tall[draw < 0.02] = NOISE
-    tall[draw < 0.008] = UNCLASSIFIED
-    return np.where(height < TALL_M, low, tall)
+@numba.njit(nogil=True, cache=True, inline="always")
+def _elevation(ground, i, j, x, y):  # type: ignore[no-untyped-def]
+    """Bilinear elevation at (x, y) of a raster with a step of 1 m."""
+    column, row = np.floor(x), np.floor(y)
+    u, v = x - column, y - row
+    c, r = int(column) - i, int(row) - j
+    c, r = min(max(c, 0), ground.shape[1] - 2), min(max(r, 0), ground.shape[0] - 2)
+    low = ground[r, c] + (ground[r, c + 1] - ground[r, c]) * u
+    high = ground[r + 1, c] + (ground[r + 1, c + 1] - ground[r + 1, c]) * u
+    return low + (high - low) * v
+
+
+@numba.njit(nogil=True, cache=True)
+def _sweep(  # type: ignore[no-untyped-def]
+    first, last, pulses, seed, frame, path, ground, gi, gj, crowns, depths,
+    vi, vj, cell, ceiling, ci, cj, foliage, hit, grass, tallness, rise, water,
+    oi, oj, cover_cell, noise, marked, xyz, code,
+):  # fmt: skip
+    """Pulses of the scan lines ``first`` to ``last``; returns the number of points written."""
+    x0, y0, cos, sin, low, high, k0, k1, half_width = frame
+    s0, t0, line_step, pulse_step, skew, sway, offset, height = path
+    mask = FOLIAGE - 1
+    fz, fy, fx = 1 / FOLIAGE_CELL_M[0], 1 / FOLIAGE_CELL_M[1], 1 / FOLIAGE_CELL_M[2]
+    rows, columns = crowns.shape[:2]
+    per_cell, per_ceiling, per_cover = 1.0 / cell, 1.0 / CEILING_CELL_M, 1.0 / cover_cell
+    first_s, last_s = low - abs(k0) * half_width, high + abs(k1) * half_width
+    n = 0
+    for line in range(first, last):
+        shift = sway * (np.sin(0.31 * line) + 0.6 * np.sin(0.093 * line + 1.0))
+        start = 0.5 * (line % 2)
+        for pulse in range(pulses):
+            state = seed ^ (np.uint64(line * pulses + pulse) * np.uint64(0xD1342543DE82EF95))
+            state = next_state(state)
+            r0 = uniform(state)
+            state = next_state(state)
+            r1 = uniform(state)
+            t = t0 + (pulse + start + 0.22 * (r0 - 0.5)) * pulse_step
+            s = s0 + (line + 0.16 * (r1 - 0.5)) * line_step + skew * t + shift
+            if s < first_s or s >= last_s:
+                continue  # A pulse leans across, not along: it stays outside.
+            x, y = x0 + s * cos - t * sin, y0 + s * sin + t * cos
+            up = ceiling[
+                min(max(int(np.floor(y * per_ceiling)) - cj, 0), ceiling.shape[0] - 1),
+                min(max(int(np.floor(x * per_ceiling)) - ci, 0), ceiling.shape[1] - 1),
+            ]
+            outside = abs(t) > half_width or s < low + t * k0 or s >= high + t * k1
+            lean = (offset - t) / height
+            if outside and abs(t) - half_width >= abs(lean) * up:
+                continue
+            z = _elevation(ground, gi, gj, x, y)
+            returns = 0
+            ended = False
+            if up > 0:
+                state = next_state(state)
+                to_sample = STEP_M * uniform(state)
+                # The pulse stays over one cell of the canopy for so much of its way down.
+                over_cell = cell / max(abs(lean), 0.01)
+                h0 = up
+                while h0 > 0 and not ended:
+                    h1 = max(h0 - over_cell, 0.0)
+                    tt = t + lean * 0.5 * (h0 + h1)
+                    px, py = x0 + s * cos - tt * sin, y0 + s * sin + tt * cos
+                    c = int(np.floor(px * per_cell + 0.5)) - vi
+                    r = int(np.floor(py * per_cell + 0.5)) - vj
+                    above, h0 = h0, h1
+                    if c < 0 or r < 0 or c >= columns or r >= rows:
+                        continue
+                    top, bottom, roof = (
+                        crowns[r, c, 0] - z,
+                        crowns[r, c, 1] - z,
+                        crowns[r, c, 2] - z,
+                    )
+                    solid = roof >= h1
+                    if not solid and (top <= h1 or bottom >= above):
+                        continue
+                    inside = (
+                        abs(tt) <= half_width - 0.5 * cell
+                        and s >= low + tt * k0
+                        and s < high + tt * k1
+                    )
+                    leaf = min(hit * crowns[r, c, 3], 0.9)
+                    h = min(above, roof) if solid else min(above, top) - to_sample
+                    end = max(h1, bottom)
+                    while solid or h > end:
+                        pz = z + h
+                        if not solid:
+                            h -= STEP_M
+                            full = foliage[
+                                int(np.floor(pz * fz)) & mask,
+                                int(np.floor(py * fy)) & mask,
+                                int(np.floor(px * fx)) & mask,
+                            ]
+                            if not full:
+                                continue
+                            state = next_state(state)
+                            if uniform(state) > leaf:
+                                continue
+                        if inside:
+                            state = next_state(state)
+                            draw = uniform(state)
+                            state = next_state(state)
+                            jitter = 2.0 * (uniform(state) - 0.5)
+                            rise_here = pz - _elevation(ground, gi, gj, px, py)
+                            pz += noise * jitter if solid else 0.5 * STEP_M * jitter
+                            on = t + lean * (pz - z)
+                            xyz[n, 0] = x0 + s * cos - on * sin
+                            xyz[n, 1] = y0 + s * sin + on * cos
+                            xyz[n, 2] = pz
+                            # Mostly tall; strays deep in the crowns, unclassified at the border.
+                            if rise_here < TALL_M:
+                                code[n] = LOW if draw > 0.006 else SCRUB
+                            elif abs(tt) > half_width - BORDER_M and draw < 0.6:
+                                code[n] = UNCLASSIFIED
+                            elif draw < 0.068:
+                                code[n] = TREE
+                            elif (
+                                not solid
+                                and draw > 1 - 0.02 * depths * (1 - rise_here / (up + 1.0)) ** 2
+                            ):
+                                code[n] = STRAY
+                            else:
+                                code[n] = TALL
+                            n += 1
+                        returns += 1
+                        state = next_state(state)
+                        if solid or returns >= MOST_RETURNS or uniform(state) > GOES_ON:
+                            ended = True
+                            break
+                    if not solid:
+                        to_sample = max(end - h, 0.0)
+            if ended or outside:
+                continue
+            c = min(max(int(np.floor(x * per_cover + 0.5)) - oi, 0), grass.shape[1] - 1)
+            r = min(max(int(np.floor(y * per_cover + 0.5)) - oj, 0), grass.shape[0] - 1)
+            state = next_state(state)
+            draw = uniform(state)
+            state = next_state(state)
+            error = uniform(state)
+            state = next_state(state)
+            error += uniform(state)
+            state = next_state(state)
+            error = 2.0 * noise * (error + uniform(state) - 1.5)
+            # Key points: the first return of its kind in a cell, drawn by lot.
+            state = next_state(state)
+            lot = uniform(state)
+            kr = min(max(int(np.floor(y)) - gj, 0), marked.shape[1] - 1)
+            kc = min(max(int(np.floor(x)) - gi, 0), marked.shape[2] - 1)
+            if water[r, c] > 0:
+                if draw > WATER_RETURNS:
+                    continue
+                grown, code[n] = 0.0, WATER
+            elif draw < grass[r, c]:
+                state = next_state(state)
+                grown = -tallness[r, c] * np.log(1.0 - uniform(state))
+                if grown > TALL_M:
+                    grown = TALL_M * draw / grass[r, c]
+                kind = 1 if grown < GRASS_M else 2
+                code[n] = LOW
+                if lot < (0.12 if kind == 1 else 0.06) and not marked[kind, kr, kc]:
+                    marked[kind, kr, kc] = True
+                    code[n] = GRASS if kind == 1 else SCRUB
+            else:
+                grown = rise[r, c]
+                # The lower ones of the returns of the ground are those in 19.
+                code[n] = BARE_TOO if draw + 6.0 * error > 0.74 + 0.26 * grass[r, c] else BARE
+                if lot < 0.12 and not marked[0, kr, kc]:
+                    marked[0, kr, kc] = True
+                    code[n] = GROUND
+            xyz[n, 0], xyz[n, 1], xyz[n, 2] = x, y, z + grown + error
+            n += 1
+    return n

@@ -16,6 +16,9 @@ import numpy as np
 BELOW_GROUND_M = 1.5
 """How far legs go on below the foot, so that none hangs in the air on a slope."""
 
+EARTH_WIRES_APART_M = 1.2
+"""Half the distance of two earth wires."""
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -86,6 +89,15 @@ def _hang(
     return ends
 
 
+def _earth(frame: _Frame, height: float, earth_wires: int) -> list[tuple[float, float, float]]:
+    """Where earth wires hold on: the top, or both ends of a beam there."""
+    if earth_wires < 2:
+        return [(0.0, 0.0, height)] * earth_wires
+    apart = EARTH_WIRES_APART_M
+    frame.bar((-apart, 0, height), (apart, 0, height), 0.06)
+    return [(-apart, 0.0, height), (apart, 0.0, height)]
+
+
 def _pole_head(
     frame: _Frame, height: float, circuits: int, earth_wires: int, reach: float, drop: float
 ) -> list[tuple[float, float, float]]:
@@ -105,7 +117,7 @@ def _pole_head(
     for x, y, z in ends:
         frame.bar((x, y, z), (x, y, z + pin), 0.06)
     points = [(x, y, z + pin) for x, y, z in ends]
-    return points + [(0.0, 0.0, height)] * earth_wires
+    return points + _earth(frame, height, earth_wires)
 
 
 def lattice(height: float, circuits: int, earth_wires: int) -> Structure:
@@ -135,27 +147,27 @@ def lattice(height: float, circuits: int, earth_wires: int) -> Structure:
         _truss_arm(frame, reach * height, z, half, 0.035 * height)
         tips.append((reach * height, 0.0, z))
     points = _hang(frame, tips, min(2.0, 0.045 * height))
-    points += [(0.0, 0.0, height)] * earth_wires
+    points += _earth(frame, height, earth_wires)
     return Structure(frame.array(), np.asarray(points), base)
 
 
 def lattice_pole(height: float, circuits: int, earth_wires: int) -> Structure:
-    """A slender braced column, 0.8 m at the foot, as medium-voltage lines have them."""
+    """A slender braced column, 0.7 m at the foot, as medium-voltage lines have them."""
     frame = _Frame()
     levels = np.linspace(0, height, max(6, round(height / 1.3)) + 1)
-    halves = np.linspace(0.4, 0.16, len(levels))
+    halves = np.linspace(0.35, 0.17, len(levels))
     _lattice_body(
         frame, np.r_[-BELOW_GROUND_M, levels], np.r_[halves[0], halves], leg=0.035, brace=0.012
     )
-    points = _pole_head(frame, height, circuits, earth_wires, reach=1.3, drop=1.6)
-    return Structure(frame.array(), np.asarray(points), 0.4)
+    points = _pole_head(frame, height, circuits, earth_wires, reach=1.02, drop=1.62)
+    return Structure(frame.array(), np.asarray(points), 0.35)
 
 
 def tubular(height: float, circuits: int, earth_wires: int) -> Structure:
     """A tapered steel or concrete pole."""
     frame = _Frame()
     frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), 0.013 * height, 0.12)
-    points = _pole_head(frame, height, circuits, earth_wires, reach=1.1, drop=1.5)
+    points = _pole_head(frame, height, circuits, earth_wires, reach=0.98, drop=1.62)
     return Structure(frame.array(), np.asarray(points), 0.3)
 
 
@@ -163,7 +175,7 @@ def wooden(height: float, circuits: int, earth_wires: int) -> Structure:
     """A wooden pole with a wooden cross-arm and its two struts."""
     frame = _Frame()
     frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), 0.17, 0.11)
-    points = _pole_head(frame, height, circuits, earth_wires, reach=1.4, drop=0.9)
+    points = _pole_head(frame, height, circuits, earth_wires, reach=1.1, drop=1.55)
     arm = points[0][2] - 0.2
     for side in (-1, 1):
         frame.bar((0, 0, arm - 0.9), (side * 0.9, 0, arm), 0.05)
@@ -181,7 +193,7 @@ def h_frame(height: float, circuits: int, earth_wires: int) -> Structure:
     frame.bar((-reach, 0, beam), (reach, 0, beam), 0.1)
     shares = (-1.0, 0.0, 1.0) if circuits == 1 else (-1.0, -0.65, -0.3, 0.3, 0.65, 1.0)
     points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.6)
-    points += [(half, 0.0, height)] * earth_wires
+    points += [(side * half, 0.0, height) for side in (1, -1)[:earth_wires]]
     return Structure(frame.array(), np.asarray(points), half)
 
 

@@ -16,6 +16,15 @@ LONGEST_M = 280.0
 OCTAVES = 8
 """Each at half the wavelength of the one before: 280 m down to about 2 m."""
 
+TERRACE_M = 1.6
+"""Height of a terrace's step."""
+
+RISER = 0.25
+"""Share of the climb that a terrace leaves as a slope, the wall; the rest is level."""
+
+TERRACED_M = 110.0
+"""Extent of the parts of the ground that are terraced."""
+
 
 class Terrain:
     """Elevation of the ground, m, at any place (x, y in metres from the start of the line).
@@ -33,6 +42,15 @@ class Terrain:
         self._amplitudes = 0.5 * settings.relief * amplitudes / amplitudes.sum()
         self._wavelengths = LONGEST_M * 0.5 ** np.arange(OCTAVES)
         self._seeds = [field_seed(settings.seed, f"terrain {k}") for k in range(OCTAVES)]
+        self._terrace_seed = field_seed(settings.seed, "terraces")
+        self._terrace_level = self._level(settings.terraces)
+
+    def _level(self, share: float) -> float:
+        """Where the field of terraces is above this, which is ``share`` of the plane, they are."""
+        if share == 0:
+            return np.inf
+        x, y = np.random.default_rng(0).uniform(0, 12_000, (2, 20_000))
+        return float(np.quantile(value_noise(x, y, TERRACED_M, self._terrace_seed), 1 - share))
 
     def _node(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         z = np.full(np.shape(x), self._elevation)
@@ -40,7 +58,15 @@ class Terrain:
         for wavelength, amplitude, seed in octaves:
             if amplitude:
                 z += amplitude * value_noise(x, y, wavelength, seed)
-        return z
+        return z if np.isinf(self._terrace_level) else self._terraced(x, y, z)
+
+    def _terraced(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Elevations ``z`` with level steps, where terraces are."""
+        mask = value_noise(x, y, TERRACED_M, self._terrace_seed) - self._terrace_level
+        steps = np.floor(z / TERRACE_M)
+        climb = np.clip((z / TERRACE_M - steps - (1 - RISER)) / RISER, 0, 1)
+        level = TERRACE_M * (steps + climb)
+        return z + np.clip(12 * mask, 0, 1) * (level - z)
 
     def raster(self, bounds: tuple[float, float, float, float]) -> Raster:
         """The ground over ``bounds`` (x min, y min, x max, y max; m) for many look-ups.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from scenenet.synthetic.noise import Raster, field_seed, hash01, value_noise
@@ -21,6 +22,19 @@ SCRUB_M = 25.0
 """Extent of woods and of patches of bushes."""
 
 WIDEST_CROWN_M = 5.0
+
+BRANCHES = 0.7
+"""Share of the radius of a crown up to which trees are cut back beside the line."""
+
+TALL_TREE_M, PER_HEIGHT = 6.0, 0.11
+"""Trees above the one keep the other, m per m of height, farther away."""
+
+THICKET_M = 4.0
+"""Extent of thickets."""
+
+FIELD_M = 75.0
+HEDGE_HALF_WIDTH_M = 0.9
+"""Extent of the fields that hedges part, and half the width of a hedge."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +59,16 @@ class Plants:
 
 @dataclass(frozen=True)
 class Canopy:
-    """Top and bottom of what grows above each cell, m above the ground; 0 where nothing does."""
+    """What grows above each cell.
+
+    Attributes:
+        top, bottom: m above the ground; 0 where nothing grows.
+        leaves: density of its foliage over the mean.
+    """
 
     top: Raster
     bottom: Raster
+    leaves: Raster
 
 
 class Vegetation:
@@ -56,12 +76,14 @@ class Vegetation:
 
     def __init__(self, settings: SyntheticSettings) -> None:
         self._settings = settings
-        names = ("stand", "stand detail", "scrub", "tree", "bush", "texture", "stand height")
+        names = ("stand", "stand detail", "scrub", "tree", "bush", "texture", "stand height",
+                 "fields", "hedges", "hedge height", "thicket", "thicket detail")  # fmt: skip
         self._seeds = {name: field_seed(settings.seed, name) for name in names}
         # The share of a field above a threshold is only known from a sample of it.
         sample = np.random.default_rng(0).uniform(0, 8000, (2, 20_000))
         self._stand_level = np.quantile(self._stand(*sample), 1 - settings.tree_cover)
         self._scrub_level = np.quantile(self._scrub(*sample), 1 - settings.bush_cover)
+        self._hedge_level = np.quantile(self._hedge(*sample), 1 - settings.hedges)
 
     def _stand(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         coarse = value_noise(x, y, STAND_M, self._seeds["stand"])
@@ -70,6 +92,9 @@ class Vegetation:
     def _scrub(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return value_noise(x, y, SCRUB_M, self._seeds["scrub"])
 
+    def _hedge(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return value_noise(x, y, FIELD_M / 2, self._seeds["hedges"])
+
     def trees(self, bounds: tuple[float, float, float, float]) -> Plants:
         """Trees whose stems stand within ``bounds`` (x min, y min, x max, y max; m)."""
         settings = self._settings
@@ -77,10 +102,10 @@ class Vegetation:
         low, high = settings.tree_height
         # Trees of one stand are of one age.
         age = 0.5 + 0.5 * value_noise(x, y, 2 * STAND_M, self._seeds["stand height"])
-        height = low + (high - low) * np.clip(0.15 + 0.7 * age + 0.4 * (draw[1] - 0.5), 0, 1)
+        height = low + (high - low) * np.clip(0.02 + 0.8 * age + 0.5 * (draw[1] - 0.5), 0, 1)
         conifer = draw[2] < settings.conifers
         radius = np.where(conifer, 0.14, 0.24) * height * (0.7 + 0.6 * draw[3]) + 0.6
-        bottom = np.where(conifer, 0.2, 0.35) * height * (0.5 + draw[0])
+        bottom = np.where(conifer, 0.12, 0.22) * height * (0.3 + 1.4 * draw[0])
         keep = self._stand(x, y) > self._stand_level
         radius = np.minimum(radius, WIDEST_CROWN_M)
         return _select(keep, x, y, height, radius, bottom, conifer)
@@ -88,7 +113,7 @@ class Vegetation:
     def bushes(self, bounds: tuple[float, float, float, float]) -> Plants:
         """Bushes that stand within ``bounds``."""
         x, y, draw = _candidates(bounds, BUSH_CELL_M, self._seeds["bush"], 2)
-        height = 0.6 + 2.8 * draw[0] ** 2
+        height = 0.6 + 4.2 * draw[0] ** 2
         radius = 0.6 + 1.2 * draw[1]
         keep = self._scrub(x, y) > self._scrub_level
         nothing = np.zeros(len(x))
@@ -101,11 +126,31 @@ class Vegetation:
         x, y = top.nodes()
         # Branches: without them crowns would be bodies of revolution.
         texture = np.ones_like(top.values)
-        for wavelength, share in ((2.2, 0.22), (0.8, 0.14)):
+        for wavelength, share in ((2.2, 0.35), (0.8, 0.22)):
             texture += share * value_noise(x, y, wavelength, self._seeds["texture"])
+        if self._settings.hedges:
+            self._plant_hedges(top, x, y, texture)
         for plants in (self.bushes(bounds), trees):
-            _paint(top, bottom, plants, texture)
-        return Canopy(top, bottom)
+            _paint(
+                top.values, bottom.values, top.i, top.j, texture,
+                plants.x, plants.y, plants.height, plants.radius, plants.bottom, plants.conifer,
+            )  # fmt: skip
+        leaves = Raster(top.i, top.j, top.step, np.exp(self._thickness(x, y)))
+        return Canopy(top, bottom, leaves)
+
+    def _thickness(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        """Thickets and open crowns: logarithm of the density of the foliage."""
+        stand = value_noise(x, y, STAND_M, self._seeds["thicket"])
+        return 0.9 * stand + 1.1 * value_noise(x, y, THICKET_M, self._seeds["thicket detail"])
+
+    def _plant_hedges(self, top: Raster, x: np.ndarray, y: np.ndarray, texture: np.ndarray) -> None:
+        """Hedges grow where a slow field changes sign; divided by its slope that is a distance."""
+        field = value_noise(x, y, FIELD_M, self._seeds["fields"])
+        slope = np.hypot(*np.gradient(field, STEP_M))
+        on_border = np.abs(field) < HEDGE_HALF_WIDTH_M * texture * np.maximum(slope, 1e-4)
+        grows = on_border & (self._hedge(x, y) > self._hedge_level)
+        height = 2.2 + 1.0 * value_noise(x, y, FIELD_M / 3, self._seeds["hedge height"])
+        top.values[grows] = (height * texture)[grows]
 
 
 def _candidates(
@@ -124,9 +169,11 @@ def _select(keep: np.ndarray, *columns: np.ndarray) -> Plants:
 
 
 def keep_clear(plants: Plants, distance: np.ndarray, clearing: float) -> Plants:
-    """The plants that stand at least ``clearing`` metres from the line."""
+    """The plants whose crowns, but for some branches, stay ``clearing`` metres from the line; the
+    taller a plant, the farther."""
+    tall = PER_HEIGHT * np.maximum(plants.height - TALL_TREE_M, 0)
     return _select(
-        distance >= clearing,
+        distance - BRANCHES * plants.radius >= clearing + tall,
         plants.x,
         plants.y,
         plants.height,
@@ -136,30 +183,34 @@ def keep_clear(plants: Plants, distance: np.ndarray, clearing: float) -> Plants:
     )
 
 
-def _paint(top: Raster, bottom: Raster, plants: Plants, texture: np.ndarray) -> None:
-    """Raise the canopy where a plant is higher than what is there already."""
-    rows, columns = top.values.shape
-    for x, y, height, radius, low, conifer in zip(
-        plants.x, plants.y, plants.height, plants.radius, plants.bottom, plants.conifer, strict=True
-    ):
-        c0 = max(int(np.ceil((x - radius) / STEP_M)) - top.i, 0)
-        c1 = min(int(np.floor((x + radius) / STEP_M)) - top.i + 1, columns)
-        r0 = max(int(np.ceil((y - radius) / STEP_M)) - top.j, 0)
-        r1 = min(int(np.floor((y + radius) / STEP_M)) - top.j + 1, rows)
-        if c0 >= c1 or r0 >= r1:
-            continue
-        window = slice(r0, r1), slice(c0, c1)
-        dx = (np.arange(c0, c1) + top.i) * STEP_M - x
-        dy = (np.arange(r0, r1) + top.j) * STEP_M - y
-        share = (dx * dx + (dy * dy)[:, None]) / (radius * radius) * texture[window]
+@numba.njit(nogil=True, cache=True)
+def _paint(top, bottom, i, j, texture, xs, ys, heights, radii, lows, conifers):  # type: ignore[no-untyped-def]
+    """Raise the canopy where a plant is higher than what is there already.
+
+    Args:
+        top, bottom, texture: (rows, columns) values of rasters whose first node is (i, j).
+        xs, ys, heights, radii, lows, conifers: (P,) columns of ``Plants``.
+    """
+    rows, columns = top.shape
+    for k in range(len(xs)):
+        x, y, height, radius, low = xs[k], ys[k], heights[k], radii[k], lows[k]
         depth = height - low
-        if conifer:
-            crown = low + depth * (1 - np.sqrt(share))
-            under = np.full_like(crown, low)
-        else:
-            dome = np.sqrt(np.maximum(1 - share, 0))
-            crown = low + depth * (0.4 + 0.6 * dome)
-            under = low + 0.4 * depth * (1 - dome)
-        higher = (share < 1) & (crown > top.values[window])
-        top.values[window][higher] = crown[higher]
-        bottom.values[window][higher] = under[higher]
+        c0 = max(int(np.ceil((x - radius) / STEP_M)) - i, 0)
+        c1 = min(int(np.floor((x + radius) / STEP_M)) - i + 1, columns)
+        r0 = max(int(np.ceil((y - radius) / STEP_M)) - j, 0)
+        r1 = min(int(np.floor((y + radius) / STEP_M)) - j + 1, rows)
+        for r in range(r0, r1):
+            dy = (r + j) * STEP_M - y
+            for c in range(c0, c1):
+                dx = (c + i) * STEP_M - x
+                share = (dx * dx + dy * dy) / (radius * radius) * texture[r, c]
+                if share >= 1:
+                    continue
+                if conifers[k]:
+                    crown, under = low + depth * (1 - np.sqrt(share)), low
+                else:
+                    dome = np.sqrt(1 - share)
+                    crown = low + depth * (0.4 + 0.6 * dome)
+                    under = low + 0.4 * depth * (1 - dome)
+                if crown > top[r, c]:
+                    top[r, c], bottom[r, c] = crown, under

@@ -71,9 +71,12 @@ def test_wire_ends_where_it_is_held_and_hangs_below_the_chord(rise):
     assert below.max() == pytest.approx(150**2 / (8 * 1000), rel=0.05)
 
 
-def test_wires_have_their_density_and_only_the_scanned_part():
+def test_scan_lines_meet_wires_and_only_the_scanned_part():
     starts, ends = np.array([[0, -1, 10], [0, 1, 10.0]]), np.array([[100, -1, 10], [100, 1, 10.0]])
-    points = string_wires(starts, ends, 900.0, 20.0, np.random.default_rng(0), (0.25, 0.75))
+    rng = np.random.default_rng(0)
+    points = string_wires(starts, ends, 900.0, 0.2, 0.8, rng, (0.25, 0.75))
     assert points[:, 0].min() >= 25
     assert points[:, 0].max() <= 75
-    assert len(points) == pytest.approx(2 * 50 * 20, rel=0.1)
+    assert len(points) == pytest.approx(2 * 50 / 0.2 * 0.8, rel=0.1)
+    steps = np.diff(np.sort(points[points[:, 1] < 0, 0]))
+    assert np.median(steps) == pytest.approx(0.2, rel=0.2), "in steps, not anywhere"

@@ -21,7 +21,7 @@ def test_ground_is_the_same_from_any_raster_and_without_one():
 
 
 def test_ground_has_no_steps():
-    terrain = Terrain(SyntheticSettings(seed=3, relief=120))
+    terrain = Terrain(SyntheticSettings(seed=3, relief=120, terraces=0))
     x = np.arange(0, 400, 0.05)
     step = np.abs(np.diff(terrain.height(x, np.full(len(x), 17.3))))
     assert step.max() < 0.05 * np.tan(np.radians(60))
@@ -29,7 +29,9 @@ def test_ground_has_no_steps():
 
 def test_relief_scales_the_hills_and_none_is_flat():
     def heights(**settings):
-        return Terrain(SyntheticSettings(seed=2, elevation=100, **settings)).height(*PLACES)
+        return Terrain(SyntheticSettings(seed=2, elevation=100, terraces=0, **settings)).height(
+            *PLACES
+        )
 
     assert np.ptp(heights(relief=0)) == 0
     np.testing.assert_allclose(heights(relief=80) - 100, 4 * (heights(relief=20) - 100))
@@ -37,7 +39,7 @@ def test_relief_scales_the_hills_and_none_is_flat():
 
 def test_roughness_breaks_the_ground_up():
     def wiggle(roughness):
-        terrain = Terrain(SyntheticSettings(seed=2, roughness=roughness))
+        terrain = Terrain(SyntheticSettings(seed=2, roughness=roughness, terraces=0))
         z = terrain.height(np.arange(0, 500, 1.0), np.zeros(500))
         return np.abs(np.diff(z, 2)).mean()
 
@@ -75,3 +77,13 @@ def test_raster_reads_a_plane_back(step):
     at = raster.nearest(px, py)
     assert np.abs(x.ravel()[at] - px).max() <= step / 2 + 1e-9
     assert np.abs(y.ravel()[at] - py).max() <= step / 2 + 1e-9
+
+
+def test_terraces_are_level_between_walls():
+    slopes = {}
+    for share in (0.0, 1.0):
+        terrain = Terrain(SyntheticSettings(seed=4, relief=170, terraces=share))
+        x = np.arange(0, 600, 1.0)
+        slopes[share] = np.abs(np.diff(terrain.height(x, np.zeros(600))))
+    assert np.quantile(slopes[1.0], 0.5) < 0.5 * np.quantile(slopes[0.0], 0.5)
+    assert slopes[1.0].max() > 1.5 * slopes[0.0].max()

@@ -1,0 +1,90 @@
+"""The files of a synthetic survey, written while the corridor is made."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenenet.files import write_json
+from scenenet.pointcloud.write import las_stream
+from scenenet.progress import track
+from scenenet.synthetic.codes import TOWER
+from scenenet.synthetic.corridor import TrueTower, make_corridor
+from scenenet.synthetic.settings import SyntheticSettings
+
+
+def make_survey(
+    settings: SyntheticSettings,
+    out: str | Path,
+    truth: str | Path | None = None,
+    towers: str | Path | None = None,
+    progress: str | None = None,
+    workers: int | None = None,
+) -> dict[str, Any]:
+    """Make a corridor and write it as a survey, stretch by stretch.
+
+    Args:
+        out: LAS or LAZ file with the labels as annotated, EDP codes.
+        truth: the same points in the same order with the labels before annotation noise.
+        towers: GeoJSON, a point per true tower: id, x, y, base, height, type.
+        progress: label under which progress is shown on stderr; None shows none.
+        workers: threads that make stretches; None for one a core. The files are the same.
+
+    Returns:
+        Counts: points, towers, length_m, classes (code -> points), and mislabelled: the share of
+        the points labelled tower that are none.
+
+    Raises:
+        InputError: a setting or path is at fault.
+    """
+    corridor = make_corridor(settings)
+    stretches = corridor.stretches(workers or len(os.sched_getaffinity(0)))
+    if progress is not None:
+        stretches = track(stretches, progress, total=len(corridor))
+    counts = np.zeros(256, np.int64)
+    wrong = 0
+    # The line starts at the origin and a file of millimetres reaches 2000 km to each side of it.
+    offsets = np.floor([settings.easting / 1000, settings.northing / 1000, 0.0]) * 1000
+    with contextlib.ExitStack() as files:
+        annotated = files.enter_context(las_stream(out, corridor.crs, offsets))
+        true = None
+        if truth is not None:
+            true = files.enter_context(las_stream(truth, corridor.crs, offsets))
+        for stretch in stretches:
+            annotated(stretch.xyz, stretch.labels)
+            if true is not None:
+                true(stretch.xyz, stretch.truth)
+            counts += np.bincount(stretch.labels, minlength=256)
+            wrong += int(((stretch.labels == TOWER) & (stretch.truth != TOWER)).sum())
+    found = corridor.towers
+    if towers is not None:
+        write_json(towers, towers_geojson(found, settings.epsg))
+    return {
+        "points": int(counts.sum()),
+        "towers": len(found),
+        "length_m": round(corridor.length, 1),
+        "classes": {int(code): int(counts[code]) for code in np.flatnonzero(counts)},
+        "mislabelled": round(wrong / max(int(counts[TOWER]), 1), 4),
+    }
+
+
+def towers_geojson(towers: list[TrueTower], epsg: int) -> dict[str, Any]:
+    """A GeoJSON feature collection with a point per tower; coordinates in the CRS it names."""
+    features = []
+    for tower in towers:
+        properties = {
+            "id": tower.id,
+            "x": round(tower.x, 3),
+            "y": round(tower.y, 3),
+            "base": round(tower.base, 3),
+            "height": round(tower.height, 3),
+            "type": tower.type,
+        }
+        point = {"type": "Point", "coordinates": [properties["x"], properties["y"]]}
+        features.append({"type": "Feature", "geometry": point, "properties": properties})
+    crs = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{epsg}"}}
+    return {"type": "FeatureCollection", "crs": crs, "features": features}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 
 from scenenet.synthetic.noise import Raster, field_seed, hash01, value_noise
@@ -121,6 +120,8 @@ class Vegetation:
 
     def canopy(self, bounds: tuple[float, float, float, float], trees: Plants) -> Canopy:
         """The canopy over ``bounds``: of ``trees``, and of the bushes there."""
+        from scenenet.synthetic.crowns import paint
+
         top = Raster.covering(bounds, STEP_M)
         bottom = Raster.covering(bounds, STEP_M)
         x, y = top.nodes()
@@ -131,8 +132,8 @@ class Vegetation:
         if self._settings.hedges:
             self._plant_hedges(top, x, y, texture)
         for plants in (self.bushes(bounds), trees):
-            _paint(
-                top.values, bottom.values, top.i, top.j, texture,
+            paint(
+                top.values, bottom.values, top.i, top.j, STEP_M, texture,
                 plants.x, plants.y, plants.height, plants.radius, plants.bottom, plants.conifer,
             )  # fmt: skip
         leaves = Raster(top.i, top.j, top.step, np.exp(self._thickness(x, y)))
@@ -181,36 +182,3 @@ def keep_clear(plants: Plants, distance: np.ndarray, clearing: float) -> Plants:
         plants.bottom,
         plants.conifer,
     )
-
-
-@numba.njit(nogil=True, cache=True)
-def _paint(top, bottom, i, j, texture, xs, ys, heights, radii, lows, conifers):  # type: ignore[no-untyped-def]
-    """Raise the canopy where a plant is higher than what is there already.
-
-    Args:
-        top, bottom, texture: (rows, columns) values of rasters whose first node is (i, j).
-        xs, ys, heights, radii, lows, conifers: (P,) columns of ``Plants``.
-    """
-    rows, columns = top.shape
-    for k in range(len(xs)):
-        x, y, height, radius, low = xs[k], ys[k], heights[k], radii[k], lows[k]
-        depth = height - low
-        c0 = max(int(np.ceil((x - radius) / STEP_M)) - i, 0)
-        c1 = min(int(np.floor((x + radius) / STEP_M)) - i + 1, columns)
-        r0 = max(int(np.ceil((y - radius) / STEP_M)) - j, 0)
-        r1 = min(int(np.floor((y + radius) / STEP_M)) - j + 1, rows)
-        for r in range(r0, r1):
-            dy = (r + j) * STEP_M - y
-            for c in range(c0, c1):
-                dx = (c + i) * STEP_M - x
-                share = (dx * dx + dy * dy) / (radius * radius) * texture[r, c]
-                if share >= 1:
-                    continue
-                if conifers[k]:
-                    crown, under = low + depth * (1 - np.sqrt(share)), low
-                else:
-                    dome = np.sqrt(1 - share)
-                    crown = low + depth * (0.4 + 0.6 * dome)
-                    under = low + 0.4 * depth * (1 - dome)
-                if crown > top[r, c]:
-                    top[r, c], bottom[r, c] = crown, under

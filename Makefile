@@ -6,13 +6,16 @@ CORES ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
-.PHONY: reproduce test lint clean help
+.PHONY: reproduce test bench lint clean help
 
 reproduce: $(INSTALLED)  ## all results of the default configuration, under results/
 	$(VENV)/bin/snakemake --cores $(CORES)
 
 test: $(INSTALLED)  ## the tests
 	$(VENV)/bin/python -m pytest
+
+bench: $(INSTALLED)  ## speed of the engine beside other ways to the same results
+	$(VENV)/bin/scenenet bench
 
 lint: $(INSTALLED)  ## style, types, formatting
 	$(VENV)/bin/ruff check .

@@ -4,3 +4,11 @@ The package follows the way of the data: ``pointcloud`` -> ``towers`` -> ``crops
 ``split`` -> ``training`` -> ``tuning`` -> ``evaluation`` -> ``inference`` -> ``report``.
 A module imports only what comes before it; ``docs/design.md`` has the list and the reasons.
 """
+
+import os
+
+# Threads of a parallel loop wait for each other at its end, and OpenMP lets them do so by spinning
+# for milliseconds, each on a core that others need: torch's threads those of our loops, and another
+# process all of them. A loop of half a millisecond then takes seven. After some microseconds they
+# give the core away now. Here, because OpenMP reads it once, when torch is imported.
+os.environ.setdefault("GOMP_SPINCOUNT", "3000")

@@ -260,6 +260,28 @@ def explain(
     )
 
 
+@app.command()
+def bench(
+    crops: Annotated[
+        Path | None, typer.Option(help="Folder of TS40K samples; synthetic crops if not given.")
+    ] = None,
+    codes: LabelCodes = Codes.edp,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="The convolution alone; under a minute.")
+    ] = False,
+    thesis: Annotated[
+        bool, typer.Option("--thesis", help="Also train on 565 synthetic crops for 50 epochs.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Measure the speed of the engine beside other ways to the same results (some minutes)."""
+    from scenenet.bench import BenchSettings, tables
+    from scenenet.bench import bench as run
+
+    settings = BenchSettings(crops=crops, codes=codes.value, quick=quick, thesis=thesis)
+    _answer(run(settings), as_json, tables)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; errors of the input end with their message and code 1."""
     try:

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from scenenet.engine.options import COMPILED, TASKS
+from scenenet.engine.options import COMPILED, TASKS, first_plane
 from scenenet.engine.planes import gather_plane, layout, sum_plane
 from scenenet.engine.runs import RUN, Runs, runs_of
 from scenenet.engine.tables import kernel_of, lanes_of, table_of
@@ -200,7 +200,7 @@ def _scatter(runs, table, kx, out):  # pragma: no cover - compiled
     for task in numba.prange(TASKS):
         buffer = np.empty(n_rows * length, table.dtype)
         reached = np.empty(height, np.bool_)
-        for p in range(task, len(runs.planes) - 1, TASKS):
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
             plane = out[p // depth, p % depth]
             if not sum_plane(p, runs, table, buffer, length, reached):
                 plane[:] = 0
@@ -218,7 +218,7 @@ def _gather(runs, upstream, kx, tables):  # pragma: no cover - compiled
     n_rows, length, above, left = layout(tables[0], kx, height, width)
     for task in numba.prange(TASKS):
         buffer = np.zeros(n_rows * length, tables.dtype)
-        for p in range(task, len(runs.planes) - 1, TASKS):
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
             plane = upstream[p // depth, p % depth]
             for y in range(height):
                 begin = (y + above) * length + left
@@ -235,7 +235,7 @@ def _pick(runs, table, kx, index, rows, out):  # pragma: no cover - compiled
     for task in numba.prange(TASKS):
         buffer = np.empty(n_rows * length, table.dtype)
         reached = np.empty(height, np.bool_)
-        for p in range(task, len(runs.planes) - 1, TASKS):
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
             if rows[p] == rows[p + 1]:
                 continue
             sum_plane(p, runs, table, buffer, length, reached)

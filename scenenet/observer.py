@@ -19,7 +19,7 @@ import torch
 from torch import Tensor
 
 from scenenet.convolution import Occupancy, convolution_gradient, convolve_dense, table_shape
-from scenenet.engine.options import COMPILED, TASKS
+from scenenet.engine.options import COMPILED, TASKS, first_plane
 from scenenet.engine.planes import gather_plane, layout, sum_plane
 from scenenet.engine.squash import squash
 from scenenet.engine.tables import kernel_of, table_of
@@ -182,7 +182,7 @@ def _observe(runs, table, kx, bias, out):  # pragma: no cover - compiled
     for task in numba.prange(TASKS):
         buffer = np.empty(n_rows * length, table.dtype)
         reached = np.empty(height, np.bool_)
-        for p in range(task, len(runs.planes) - 1, TASKS):
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
             plane = out[p // depth, p % depth]
             sum_plane(p, runs, table, buffer, length, reached)
             for y in range(height):
@@ -210,7 +210,7 @@ def _score(
         slope = np.zeros(n_rows * length, table.dtype)
         reached = np.empty(height, np.bool_)
         error, by_bias = 0.0, 0.0
-        for p in range(task, len(runs.planes) - 1, TASKS):
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
             occupied = sum_plane(p, runs, table, buffer, length, reached)
             for y in range(height):
                 begin = (y + above) * length + left
@@ -254,7 +254,7 @@ def _count(
         reached = np.empty(height, np.bool_)
         row = np.empty(width, table.dtype)
         steps = np.empty((height, width), np.int32)
-        for p in range(task, len(runs.planes) - 1, TASKS):
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
             sum_plane(p, runs, table, buffer, length, reached)
             for y in range(height):
                 if not reached[y]:

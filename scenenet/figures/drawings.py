@@ -20,6 +20,7 @@ from scenenet.results import Results, SeedResult, parameter_columns, read_result
 if TYPE_CHECKING:
     from scenenet.figures.scenes import View
     from scenenet.pointcloud import PointCloud
+    from scenenet.store import StoreReader
 
 POINTS_PER_PICTURE = 60_000
 """Enough to look dense at the size the pictures have."""
@@ -56,6 +57,47 @@ def _tower_settings(results: Results, survey: str) -> Mapping[str, Any]:
 
     recorded = read_result(path).get("settings", {})
     return {name: recorded[name] for name in TowerSettings.model_fields if name in recorded}
+
+
+def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
+    """The crop with the median number of points of each survey; of recorded samples more."""
+    from scenenet.figures.beside import crops_beside, kinds_of
+    from scenenet.store import StoreReader
+
+    shown = {}
+    for survey in results.surveys:
+        reader = StoreReader(results.folder / "crops" / survey / "manifest.json")
+        ordered = sorted(reader.manifest["crops"], key=lambda entry: (entry["points"], entry["id"]))
+        made = (results.folder / "synthetic" / f"{survey}.laz").exists()
+        ranks = (0.5,) if made else (0.17, 0.5, 0.83)
+        chosen = {int(rank * len(ordered)): None for rank in ranks if ordered}
+        for entry in (ordered[place] for place in chosen):
+            arrays = reader.get(entry["id"])
+            keep = _thin(len(arrays["xyz"]))
+            codes = arrays["classification"][keep]
+            kinds = kinds_of(codes) if reader.manifest["codes"] == "edp" else _plain(codes, reader)
+            title = f"{entry['id']}\n({'synthetic' if made else 'recorded'})"
+            shown[title] = (arrays["xyz"][keep], kinds)
+    if not shown:
+        raise InputError("no survey has a crop to show", file=results.folder)
+    return crops_beside(shown, out), (
+        "Crops from the side and from above, all at the same scale: of a synthetic survey the one "
+        "with the median number of points, of recorded ones three. Points are coloured by what "
+        "they were labelled."
+    )
+
+
+def _plain(codes: np.ndarray, reader: StoreReader) -> np.ndarray:
+    """What points are (N,), by the groups of their class scheme."""
+    from scenenet.pointcloud import class_scheme
+
+    scheme = class_scheme(reader.manifest["codes"])
+    kinds = np.full(len(codes), "other", dtype="U10")
+    for name, group in (("ground", scheme.ground), ("tall", scheme.vegetation),
+                        ("stray", scheme.noise), ("wire", scheme.wire),
+                        ("tower", scheme.tower)):  # fmt: skip
+        kinds[np.isin(codes, list(group))] = name
+    return kinds
 
 
 def draw_grids(results: Results, reference: str, out: Path) -> tuple[str, str]:

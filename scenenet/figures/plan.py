@@ -82,6 +82,9 @@ def plan(
             draw = _bind(drawings.draw_clusters, results, survey, path, codes)
             title = f"Towers of {survey} told apart"
             planned.append(Drawing(f"clusters-{survey}", title, "towers", draw, survey=survey))
+    if results.surveys:
+        draw = _bind(drawings.draw_surveys, results)
+        planned.append(Drawing("surveys", "A crop of each survey, at one scale", "data", draw))
     models = tuple(results.models)
     reference = _reference(results)
     if reference is not None:

@@ -88,7 +88,7 @@ def clusters(xy: np.ndarray, labels: np.ndarray, out: str | Path) -> str:
     noise = labels < 0
     found = np.unique(labels[~noise])
     if len(xy) > 1:
-        local = (xy - xy.mean(axis=0)) @ _principal_axes(xy)
+        local = (xy - xy.mean(axis=0)) @ principal_axes(xy)
         local[:, 0] -= local[:, 0].min()
         axis.scatter(*local[noise].T, s=4, c="#8A929B", marker="x", lw=0.6, rasterized=True)
         members = [local[labels == label] for label in found]
@@ -151,7 +151,7 @@ def survey_overview(
         out: PNG to write.
     """
     centre = xyz[:, :2].mean(axis=0)
-    axes_of_line = _principal_axes(xyz[:, :2])
+    axes_of_line = principal_axes(xyz[:, :2])
     along, across = ((xyz[:, :2] - centre) @ axes_of_line).T
     start = along.min()
     figure, axes = new_figure(2, 1, width=9.5, height=5, sharex=True)
@@ -178,7 +178,7 @@ def survey_overview(
     )
 
 
-def _principal_axes(xy: np.ndarray) -> np.ndarray:
+def principal_axes(xy: np.ndarray) -> np.ndarray:
     """(2, 2) columns: the direction of greatest spread and the one across it."""
     _, axes = np.linalg.eigh(np.cov((xy - xy.mean(axis=0)).T))
     along = axes[:, 1] * (1 if axes[0, 1] >= 0 else -1)
@@ -186,7 +186,7 @@ def _principal_axes(xy: np.ndarray) -> np.ndarray:
 
 
 def _side(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    along = (xyz[:, :2] - xyz[:, :2].mean(axis=0)) @ _principal_axes(xyz[:, :2])[:, 0]
+    along = (xyz[:, :2] - xyz[:, :2].mean(axis=0)) @ principal_axes(xyz[:, :2])[:, 0]
     return along - along.min(), xyz[:, 2] - xyz[:, 2].min()
 
 

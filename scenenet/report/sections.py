@@ -149,6 +149,7 @@ def data(material: Material) -> Section | None:
             "shares agree only as far as the surveys are alike."
         )
         blocks.append(table(classes, columns, caption, "tables/classes.csv"))
+    blocks += material.figures("data")
     return Section("data", "The surveys", blocks) if blocks else None
 
 

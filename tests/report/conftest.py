@@ -88,11 +88,12 @@ def _write_survey(folder: Path) -> None:
     ]  # fmt: skip
     write_csv(folder / "towers" / "north" / "towers.csv", towers)
     crops = folder / "crops" / "north"
-    facts = {"survey": "north", "codes": "edp", "crops": [{"id": name} for name in CROPS]}
+    facts = {"survey": "north", "codes": "edp", "crops": []}
     with create(crops / "crops.zarr.zip", crops / "manifest.json", facts) as writer:
         for number, name in enumerate(CROPS):
             xyz, codes = tower_crop(number)
             writer.add(name, {"xyz": xyz, "classification": codes})
+            facts["crops"].append({"id": name, "points": len(xyz)})
     samples = [{"id": name, "occupied": 4000, "tower": 100, "seconds": seconds}
                for name, seconds in zip(CROPS, (0.1, 0.2, 0.3), strict=True)]  # fmt: skip
     write_json(folder / "voxels" / "north" / "cube-64" / "manifest.json", {"samples": samples})

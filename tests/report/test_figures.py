@@ -35,6 +35,11 @@ def test_the_plan_names_every_picture_before_anything_has_run(tmp_path: Path):
     ]  # fmt: skip
 
 
+def test_surveys_of_the_data_set_are_shown_beside_each_other(results: Results):
+    names = {d.name: d.section for d in plan(results)}
+    assert names["surveys"] == "data"
+
+
 def test_a_folder_of_single_crops_has_no_map_of_its_towers(results: Results):
     names = [drawing.name for drawing in plan(results, sources={"ts40k": ("samples", "edp")})]
     assert "clusters-ts40k" not in names
@@ -84,8 +89,8 @@ def test_the_map_of_towers_counts_them_and_the_noise(results: Results, tmp_path:
     codes = np.full(len(xyz), 15, np.uint8)
     write_las(tmp_path / "north.laz", PointCloud(xyz, codes, class_scheme("edp")))
     sources = {"north": (str(tmp_path / "north.laz"), "edp")}
-    drawing = plan(replace(results, models={}, predicted=[]), sources=sources)
-    (picture,) = draw_all(drawing, tmp_path)
+    planned = plan(replace(results, models={}, predicted=[], surveys=[]), sources=sources)
+    (picture,) = draw_all(planned, tmp_path)
     assert "805 points labelled tower in 2 clusters" in picture.alt
     assert "5 points belong to none" in picture.alt
 

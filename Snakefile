@@ -5,6 +5,7 @@ from snakemake.utils import min_version
 min_version("9.10")
 
 
+configfile: "config/studies.yaml"
 configfile: "config/config.yaml"
 
 
@@ -13,6 +14,7 @@ include: "workflow/rules/surveys.smk"
 include: "workflow/rules/dataset.smk"
 include: "workflow/rules/models.smk"
 include: "workflow/rules/predict.smk"
+include: "workflow/rules/studies.smk"
 include: "workflow/rules/tracking.smk"
 include: "workflow/rules/report.smk"
 
@@ -28,6 +30,7 @@ rule all:
         tunings=TUNINGS,
         scores=SCORES,
         tables=TABLES,
+        studies=STUDIES,
         models=[champion_file(model.name) for model in settings.models],
         predictions=expand(f"{R}/predict/{{survey}}/{{survey}}.laz", survey=NEW),
         store=list(STORE.values()),

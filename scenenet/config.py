@@ -24,6 +24,7 @@ from scenenet.protocol import ModelSettings, TrainingSettings, TuningSettings
 from scenenet.provenance import FULL_BELOW_BYTES
 from scenenet.settings import NAME, Settings
 from scenenet.split import SplitSettings
+from scenenet.studies.settings import StudySettings
 from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.towers import TowerSettings
 from scenenet.tracking.store import TrackingSettings
@@ -97,6 +98,9 @@ class Config(Settings):
         min_length=1, description="each model is trained once from each of these"
     )
     tuning: TuningSettings = TuningSettings()
+    studies: tuple[StudySettings, ...] = Field(
+        (), description="many small trainings that differ in one thing; config/studies.yaml"
+    )
     detection: DetectionSettings = DetectionSettings()
     predict: Prediction = Prediction()
     tracking: TrackingSettings = TrackingSettings()
@@ -124,6 +128,7 @@ class Config(Settings):
             ("models", [model.name for model in self.models]),
             ("seeds", list(self.seeds)),
             ("synthetic.surveys", [survey.name for survey in self.synthetic.surveys]),
+            ("studies", [study.name for study in self.studies]),
         ):
             if twice := [str(name) for name, count in Counter(names).items() if count > 1]:
                 raise ValueError(f"{what}: {', '.join(twice)} is there more than once")
@@ -133,10 +138,17 @@ class Config(Settings):
                 f"predict.model: {self.predict.model!r} is not one of the models: "
                 f"{', '.join(known)}"
             )
+        for study in self.studies:
+            if study.model not in known:
+                raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
+            study.plans(self.model_named(study.model), self.voxels, self.split)
         return self
 
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)
+
+    def study_named(self, name: str) -> StudySettings:
+        return next(study for study in self.studies if study.name == name)
 
     def synthetic_named(self, name: str) -> SyntheticSettings:
         """The settings of a synthetic survey, apart from its name."""

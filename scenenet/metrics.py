@@ -136,6 +136,17 @@ class ThresholdCurve:
         tp, fp = int(self.true[step + 1 :].sum()), int(self.false[step + 1 :].sum())
         return Confusion(tp, fp, int(self.true.sum()) - tp, int(self.false.sum()) - fp)
 
+    def at(self, tau: float) -> Confusion:
+        """At one of the thresholds.
+
+        Raises:
+            ValueError: ``tau`` is none of them.
+        """
+        (steps,) = np.nonzero(self.tau == tau)
+        if len(steps) != 1:
+            raise ValueError(f"{tau} is none of the {len(self.tau)} thresholds")
+        return self.confusion(int(steps[0]))
+
     def precision_recall(self) -> tuple[np.ndarray, np.ndarray]:
         """Precision and recall (650,) at each tau; both 0 where nothing is detected."""
         tp = self.true[::-1].cumsum()[::-1][1:]

@@ -14,6 +14,8 @@ from scenenet.files import read_json
 if TYPE_CHECKING:
     import pandas as pd
 
+    from scenenet.studies.settings import StudySettings
+
 HISTORY_MEASURES = frozenset({"epoch", "loss", "fidelity", "penalty", "seconds", "learning_rate"})
 """Columns of a training history that are not parameters of the model."""
 
@@ -78,6 +80,7 @@ class Results:
         seeds: seeds of the trainings.
         surveys: surveys that make the data set.
         predicted: surveys that were classified.
+        studies: what was studied beside.
     """
 
     folder: Path
@@ -85,6 +88,7 @@ class Results:
     seeds: Sequence[int]
     surveys: Sequence[str] = ()
     predicted: Sequence[str] = ()
+    studies: Sequence[StudySettings] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", Path(self.folder))
@@ -127,6 +131,11 @@ class Results:
             provenance=read_result(provenance) if provenance.exists() else None,
             model_files=self._files("models", model, f"seed-{seed}"),
         )
+
+    def study_runs(self, study: str) -> pd.DataFrame | None:
+        """A row per variant and seed of a study; None if it was not run."""
+        path = self.folder / "studies" / study / "runs.csv"
+        return read_table(path) if path.exists() else None
 
     def champion_file(self, model: str) -> Path | None:
         """The model that predicts (``models/MODEL.json``, or only ``.safetensors``)."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from scenenet.files import atomic
 from scenenet.published import Published, Thesis
 from scenenet.results import Results, SeedResult
+from scenenet.studies.summary import summarise
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -221,12 +222,18 @@ TABLES: Mapping[str, Callable[[Results, Thesis], pd.DataFrame]] = {
 def write_tables(
     results: Results, thesis: Thesis, out: str | Path, names: Iterable[str] = tuple(TABLES)
 ) -> list[Path]:
-    """Write the tables called ``names`` as ``out/NAME.csv``."""
+    """Write the tables called ``names`` as ``out/NAME.csv``, and those of the studies as
+    ``out/study-NAME.csv``."""
+    made = {name: TABLES[name](results, thesis) for name in names}
+    for study in results.studies:
+        runs = results.study_runs(study.name)
+        if runs is not None:
+            made[f"study-{study.name}"] = summarise(study, runs, thesis)
     paths = []
-    for name in names:
+    for name, table in made.items():
         path = Path(out) / f"{name}.csv"
         with atomic(path) as partial:
-            TABLES[name](results, thesis).to_csv(partial, index=False, float_format="%.6g")
+            table.to_csv(partial, index=False, float_format="%.6g")
         paths.append(path)
     return paths
 

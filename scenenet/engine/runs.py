@@ -10,8 +10,8 @@ import numpy as np
 from scenenet.engine.options import COMPILED
 
 RUN = 4
-"""Voxels in a run. With kernels up to 13 wide, a run adds 16 numbers to a row of the answer, which is
-one row of ``rows``. In real crops there are 2.4 times fewer runs than voxels."""
+"""Voxels in a run. With kernels up to 13 wide, a run adds 16 numbers to a row of the answer: one
+vector. In real crops there are 2.4 times fewer runs than voxels."""
 
 
 class Runs(NamedTuple):

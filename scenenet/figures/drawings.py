@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from scenenet.figures.scenes import View
     from scenenet.pointcloud import PointCloud
     from scenenet.store import StoreReader
+    from scenenet.studies.settings import StudySettings
 
 POINTS_PER_PICTURE = 60_000
 """Enough to look dense at the size the pictures have."""
@@ -46,6 +47,34 @@ def draw_clusters(
         f"m, at least {settings.min_points} points) with a number of its own; crosses belong to "
         "none. The line is turned to lie flat, and the axes differ in scale. As thesis Figure 5.2."
     )
+
+
+def draw_study(
+    results: Results, study: StudySettings, thesis: Thesis | None, out: Path
+) -> tuple[str, str]:
+    from scenenet.figures import studies
+    from scenenet.studies.summary import summarise
+
+    runs = results.study_runs(study.name)
+    if runs is None:
+        raise InputError("has not been run", file=results.folder / "studies" / study.name)
+    summary = summarise(study, runs, thesis or Thesis(source="", numbers={}))
+    if len(study.vary) == 2:
+        names, values = zip(*study.vary.items(), strict=True)
+        first, second = (name.rpartition(".")[2] for name in names)
+        alt = studies.heat_map(summary, (first, second), (len(values[0]), len(values[1])), out)
+    else:
+        alt = studies.rows(summary, out)
+    hollow = " Hollow points are the thesis'." if any(v.thesis for v in study.variants) else ""
+    return alt, (
+        f"{study.asks} Scores of the tower class on the {study.part} crops at the tau that is best "
+        f"on validation, {_seeds(study)}.{hollow} Thesis {study.place}."
+    )
+
+
+def _seeds(study: StudySettings) -> str:
+    n = len(study.seeds)
+    return "one seed" if n == 1 else f"mean and spread over {n} seeds"
 
 
 def _tower_settings(results: Results, survey: str) -> Mapping[str, Any]:

@@ -116,6 +116,9 @@ def plan(
         draw = _bind(drawings.draw_prediction, results, survey)
         name = f"prediction-{survey}"
         planned.append(Drawing(name, f"{survey} classified", "predictions", draw, survey=survey))
+    for study in results.studies:
+        draw = _bind(drawings.draw_study, results, study, thesis)
+        planned.append(Drawing(f"study-{study.name}", study.title, "studies", draw))
     return planned
 
 

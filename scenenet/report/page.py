@@ -10,7 +10,7 @@ from pathlib import Path
 from scenenet.errors import InputError
 from scenenet.files import write_text
 from scenenet.published import Thesis
-from scenenet.report import sections, survey_sections
+from scenenet.report import sections, study_sections, survey_sections
 from scenenet.report.blocks import Section
 from scenenet.report.sections import Material, SectionMaker
 from scenenet.results import Results
@@ -24,6 +24,7 @@ SECTIONS: Sequence[SectionMaker] = (
     sections.positions,
     sections.learned,
     sections.crops,
+    study_sections.studies,
     survey_sections.predictions,
     sections.data,
     sections.towers,

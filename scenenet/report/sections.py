@@ -78,7 +78,7 @@ VOXEL_SCORES = _scores(
 )
 
 
-def _beside(columns: Sequence[Column]) -> list[Column]:
+def beside(columns: Sequence[Column]) -> list[Column]:
     """Each score with the thesis' right behind it, where the thesis has it."""
     both = []
     for column in columns:
@@ -211,7 +211,7 @@ def models(material: Material) -> Section | None:
         Column("model", "model"),
         Column("counted", "counted"),
         Column("parameters", "parameters", "count"),
-        *_beside(VOXEL_SCORES),
+        *beside(VOXEL_SCORES),
     ]
     caption = (
         "Scores of the tower class over all voxels of the test crops at the tau chosen on "

@@ -10,7 +10,7 @@ def each_training(pattern):
     ]
 
 
-def gathered(models=None, surveys=TRAIN, predicted=()):
+def gathered(models=None, surveys=TRAIN, predicted=(), studies=()):
     """The arguments of ``scenenet.results.Results``. Models are pairs, because their order counts
     and that of a dict does not survive in a parameter."""
     chosen = settings.models if models is None else models
@@ -20,6 +20,7 @@ def gathered(models=None, surveys=TRAIN, predicted=()):
         "seeds": list(settings.seeds) if chosen else [],
         "surveys": list(surveys),
         "predicted": list(predicted),
+        "studies": [settings.study_named(study).model_dump(mode="json") for study in studies],
     }
 
 
@@ -68,19 +69,26 @@ TUNINGS = [
     *(tuned_file(model.name, seed) for model in settings.models for seed in settings.seeds),
 ]
 SCORES = each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.json")
-TABLES = [f"{R}/tables/{name}.csv" for name in TABLE_NAMES]
+STUDIED = [study.name for study in settings.studies]
+STUDIES = expand(f"{R}/studies/{{study}}/runs.csv", study=STUDIED)
+TABLES = expand(
+    f"{R}/tables/{{name}}.csv", name=[*TABLE_NAMES, *(f"study-{study}" for study in STUDIED)]
+)
 PROTOCOL = (
     f"{GRID}, split {settings.split.train:.0%} / {settings.split.validation:.0%} / "
     f"{settings.split.test:.0%} by stretch of line"
 )
 
-_planned = plan(Results(**{**gathered(), "models": {m.name: m.kind for m in settings.models}}))
+_planned = plan(
+    Results(**{**gathered(), "models": {m.name: m.kind for m in settings.models}, "studies": ()})
+)
 FIGURES = [drawing.name for drawing in _planned]
 MODEL_FIGURES = [drawing.name for drawing in _planned if drawing.models]
 ALL_PICTURES = [
     *FIGURES,
     *(f"clusters-{survey}" for survey in MAPPED),
     *(f"prediction-{survey}" for survey in NEW),
+    *(f"study-{study}" for study in STUDIED),
 ]
 RECORDS = [
     *expand(f"{R}/check/{{survey}}/provenance.json", survey=CHECKED),
@@ -92,6 +100,7 @@ RECORDS = [
     *each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.provenance.json"),
     *expand(f"{R}/models/{{model}}.provenance.json", model=[m.name for m in settings.models]),
     *expand(f"{R}/predict/{{survey}}/provenance.json", survey=NEW),
+    *expand(f"{R}/studies/{{study}}/provenance.json", study=STUDIED),
     f"{R}/tables/provenance.json",
     f"{R}/figures/provenance.json",
     f"{R}/mlflow/provenance.json",

@@ -28,6 +28,7 @@ rule tables:
         trainings=TRAININGS,
         tunings=TUNINGS,
         scores=SCORES,
+        studies=STUDIES,
         thesis=ancient(settings.thesis),
     output:
         tables=TABLES,
@@ -41,7 +42,7 @@ rule tables:
         mem_mb=1000,
         runtime=10,
     params:
-        job=job("tables", {}, results=gathered(), input=THESIS),
+        job=job("tables", {}, results=gathered(studies=STUDIED), input=THESIS),
     message:
         "Writing the tables"
     script:
@@ -142,6 +143,36 @@ rule prediction_map:
         "../scripts/figures.py"
 
 
+rule study_figure:
+    input:
+        runs=f"{R}/studies/{{study}}/runs.csv",
+        thesis=ancient(settings.thesis),
+    output:
+        **pictures(["study-{study}"]),
+        provenance=f"{R}/figures/study-{{study}}.provenance.json",
+    log:
+        f"{R}/logs/study_figure/{{study}}.log",
+    benchmark:
+        f"{R}/benchmarks/study_figure/{{study}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        job=lambda w: job(
+            "figures",
+            {},
+            results=gathered(models=[], surveys=[], studies=[w.study]),
+            pictures=[f"study-{w.study}"],
+            sources={},
+            input=THESIS,
+        ),
+    message:
+        "Drawing the study {wildcards.study}"
+    script:
+        "../scripts/figures.py"
+
+
 rule report:
     input:
         tables=TABLES,
@@ -171,7 +202,7 @@ rule report:
         job=job(
             "report",
             {},
-            results=gathered(surveys=TRAIN, predicted=NEW),
+            results=gathered(surveys=TRAIN, predicted=NEW, studies=STUDIED),
             input=THESIS,
         ),
     message:

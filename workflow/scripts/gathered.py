@@ -7,6 +7,8 @@ import adapter
 
 def results_of(job: adapter.Job):
     from scenenet.results import Results
+    from scenenet.studies.settings import StudySettings
 
     asked = job.identity["results"]
-    return Results(**{**asked, "models": dict(asked["models"])})
+    studies = [StudySettings(**study) for study in asked["studies"]]
+    return Results(**{**asked, "models": dict(asked["models"]), "studies": studies})

@@ -1,0 +1,46 @@
+"""A study in one table: mean and spread over seeds, the thesis' numbers beside."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from scenenet.published import Thesis
+from scenenet.studies.settings import StudySettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
+PUBLISHED = ("precision", "recall", "miou")
+
+
+def summarise(study: StudySettings, runs: pd.DataFrame, thesis: Thesis) -> pd.DataFrame:
+    """One row per variant, in their order.
+
+    Args:
+        runs: of ``run_study``.
+
+    Returns:
+        variant, n_seeds, live_share; mean and ``_std`` of each score over all seeds; mean of
+        parameters, training_seconds, inference_ms; ``thesis_`` columns of what is published.
+    """
+    import pandas as pd
+
+    rows = []
+    for variant in study.all_variants():
+        group = runs[runs["variant"] == variant.name]
+        row: dict[str, object] = {
+            "variant": variant.name,
+            "n_seeds": len(group),
+            "live_share": group["alive"].mean(),
+        }
+        for name in SCORES:
+            row |= {name: group[name].mean(), f"{name}_std": group[name].std()}
+        for name in ("parameters", "training_crops", "training_seconds", "inference_ms"):
+            row[name] = group[name].mean()
+        for name in PUBLISHED:
+            row[f"thesis_{name}"] = (
+                thesis.value(f"{variant.thesis}.{name}") if variant.thesis else None
+            )
+        rows.append(row)
+    return pd.DataFrame(rows)

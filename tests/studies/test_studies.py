@@ -1,0 +1,141 @@
+"""A study trains what it says, once, and scores it as a training by itself would be scored."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+
+from scenenet.crops import CropSettings, cut_crops
+from scenenet.protocol import ModelSettings, TrainingSettings
+from scenenet.published import Thesis
+from scenenet.split import SplitSettings
+from scenenet.studies import run
+from scenenet.studies.run import COLUMNS, run_study
+from scenenet.studies.settings import StudySettings
+from scenenet.studies.summary import summarise
+from scenenet.synthetic import SyntheticSettings, make_survey
+from scenenet.towers import TowerSettings, survey_towers
+from scenenet.voxels import VoxelSettings
+
+MODEL = ModelSettings(
+    name="m", kind="scenenet", kernel_size=(5, 5, 5),
+    training=TrainingSettings(epochs=2, learning_rate=0.01, batch_size=2),
+)  # fmt: skip
+GRID = VoxelSettings(resolution=32)
+SPLIT = SplitSettings(train=0.4, validation=0.2, test=0.4, stretch=1, neighbour=30)
+
+
+def study(**fields) -> StudySettings:
+    told = {"name": "s", "title": "t", "place": "5", "asks": "?", "seeds": (0, 1)}
+    return StudySettings(**(told | fields))
+
+
+@pytest.fixture(scope="module")
+def crops(tmp_path_factory):
+    """Crops of a synthetic line of seven towers."""
+    folder = tmp_path_factory.mktemp("study")
+    settings = SyntheticSettings(towers=7, seed=4, density=12, tower_density=24)
+    make_survey(settings, folder / "line.laz")
+    towers = survey_towers(folder / "line.laz", "edp", TowerSettings())
+    manifest = folder / "manifest.json"
+    cut_crops("line", folder / "line.laz", "edp", towers, CropSettings(),
+              folder / "crops.zarr.zip", manifest)  # fmt: skip
+    return [manifest]
+
+
+def test_every_combination_is_a_variant():
+    both = study(vary={"training.loss.alpha": (0, 5), "kernel_size": ((9, 5, 5), (9, 9, 9))})
+    plans = both.plans(MODEL, GRID, SPLIT)
+    assert [plan.name for plan in plans] == [
+        "alpha 0, kernel_size 9x5x5", "alpha 0, kernel_size 9x9x9",
+        "alpha 5, kernel_size 9x5x5", "alpha 5, kernel_size 9x9x9",
+    ]  # fmt: skip
+    assert [plan.model.training.loss.alpha for plan in plans] == [0, 0, 5, 5]
+    assert plans[1].model.kernel_size == (9, 9, 9)
+    assert all(plan.model.training.epochs == 2 for plan in plans)
+
+
+def test_changes_go_where_they_belong_and_common_ones_to_all():
+    told = study(
+        common={"training.epochs": 7},
+        variants=[
+            {
+                "name": "a",
+                "changes": {"voxels.resolution": 64, "split.train": 0.2, "split.test": 0.6},
+            },
+            {"name": "b", "changes": {"applied.kernel_size": [9, 3, 3], "applied.resolution": 128}},
+        ],
+    )
+    a, b = told.plans(MODEL, GRID, SPLIT)
+    assert (a.model.training.epochs, b.model.training.epochs) == (7, 7)
+    assert (a.voxels.resolution, a.applied_voxels.resolution, a.split.train) == (64, 64, 0.2)
+    assert (b.voxels.resolution, b.applied_voxels.resolution) == (32, 128)
+    assert (a.applied_size, b.applied_size) == (None, (9, 3, 3))
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"training.los.alpha": 1}, "los"),
+        ({"training.epochs": 0}, "epochs"),
+        ({"split.train": 0.9}, "sum to 1"),
+        ({"applied.tau": 0.5}, "applied.tau"),
+        ({"voxels.resolution": 48}, "resolution"),
+    ],
+)
+def test_a_change_that_cannot_be_is_named(changes, named):
+    with pytest.raises(ValueError, match=named):
+        study(variants=[{"name": "wrong", "changes": changes}]).plans(MODEL, GRID, SPLIT)
+
+
+def test_either_variants_or_vary():
+    with pytest.raises(ValueError, match="either"):
+        study()
+    with pytest.raises(ValueError, match="more than once"):
+        study(variants=[{"name": "a"}, {"name": "a"}])
+
+
+def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
+    trained = []
+    original = run.fit
+    monkeypatch.setattr(run, "fit", lambda *a: trained.append(a) or original(*a))
+    told = study(
+        variants=[
+            {"name": "as trained"},
+            {"name": "smaller", "changes": {"applied.kernel_size": [5, 3, 3]}},
+            {"name": "cylinder", "changes": {"geneos": ["cylinder"]}},
+        ]
+    )
+    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    assert len(table) == 6
+    assert len(trained) == 4  # the smaller kernels are sampled from the same trainings
+    assert list(table["parameters"]) == [11, 11, 11, 11, 2, 2]
+    read = pd.read_csv(tmp_path / "runs.csv")
+    assert tuple(read.columns) == COLUMNS
+    scores = table.set_index(["variant", "seed"])[["precision", "recall", "f05", "tau", "loss"]]
+    again = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "again.csv")
+    pd.testing.assert_frame_equal(
+        scores, again.set_index(["variant", "seed"])[list(scores)], check_exact=True
+    )
+    assert scores.loc[("as trained", 0), "loss"] == scores.loc[("smaller", 0), "loss"]
+    assert scores["f05"].nunique() > 1
+
+
+def test_the_summary_is_over_seeds_with_the_thesis_beside():
+    told = study(variants=[{"name": "a", "thesis": "ablation.a"}, {"name": "b"}])
+    runs = pd.DataFrame(
+        [
+            {"variant": v, "seed": s, "alive": f > 0, "f05": f}
+            for v, s, f in [("a", 0, 0.2), ("a", 1, 0.4), ("b", 0, 0.0), ("b", 1, 0.3)]
+        ]
+    )
+    for name in set(COLUMNS) - set(runs):
+        runs[name] = 1.0
+    number = {"value": 0.5, "place": "Table 5.5"}
+    thesis = Thesis(source="s", numbers={"ablation.a.precision": number})
+    a, b = summarise(told, runs, thesis).to_dict("records")
+    assert a["f05"] == pytest.approx(0.3)
+    assert a["f05_std"] == pytest.approx(0.141421, abs=1e-6)
+    assert (a["live_share"], b["live_share"]) == (1.0, 0.5)
+    assert a["thesis_precision"] == 0.5
+    assert pd.isna(b["thesis_precision"])

@@ -10,6 +10,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 from mlflow import MlflowClient
 from mlflow.entities import ViewType
@@ -17,6 +18,8 @@ from mlflow.entities import ViewType
 from scenenet.errors import InputError
 from scenenet.figures import draw_all, plan
 from scenenet.results import Results
+from scenenet.studies.run import COLUMNS
+from scenenet.studies.settings import StudySettings
 from scenenet.tracking import (
     RunGroup,
     RunRecord,
@@ -26,6 +29,7 @@ from scenenet.tracking import (
     model_groups,
     store_id,
 )
+from scenenet.tracking.studies import experiment_of, study_groups
 
 
 @pytest.fixture(scope="session")
@@ -292,3 +296,28 @@ def test_a_store_moved_away_from_its_artifacts_is_refused(settings, tmp_path):
 def test_the_folder_store_mlflow_gave_up_is_refused(tmp_path):
     with pytest.raises(InputError, match="MLflow refused the store"):
         create_store(TrackingSettings(uri=str(tmp_path / "mlruns")), tmp_path / "store.json")
+
+
+def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(settings, tmp_path):
+    study = StudySettings(
+        name="ablations", title="t", place="Table 5.5", asks="Which?", seeds=(0, 1),
+        variants=({"name": "A", "changes": {"geneos": ["cylinder"]}}, {"name": "E"}),
+    )  # fmt: skip
+    one = dict.fromkeys(COLUMNS, 0.5)
+    rows = [one | {"variant": v, "seed": s, "f05": 0.2 + s / 10} for v in "AE" for s in (0, 1)]
+    table = pd.DataFrame(rows)
+    own = experiment_of(settings, study.name)
+    create_store(settings, tmp_path / "store.json", [own.experiment])
+    groups = study_groups(study, table, "toys")
+    written = log_runs(own, groups, tmp_path / "runs.json", tmp_path / "store.json")
+    assert len(written["runs"]) == 6
+    client = MlflowClient(tracking_uri=settings.uri)
+    experiment = client.get_experiment_by_name("scenenet-ablations")
+    logged = {r.info.run_name: r.data for r in client.search_runs([experiment.experiment_id])}
+    assert logged["A"].metrics["test_f05"] == pytest.approx(0.25)
+    assert logged["A"].metrics["test_f05_std"] == pytest.approx(0.0707107)
+    assert logged["A, seed 1"].metrics["test_f05"] == pytest.approx(0.3)
+    assert logged["A, seed 1"].params["geneos"] == '["cylinder"]'
+    assert logged["E"].tags["study"] == "ablations"
+    again = log_runs(own, groups, tmp_path / "runs.json")
+    assert {run["status"] for run in again["runs"].values()} == {"kept"}

@@ -71,6 +71,7 @@ TUNINGS = [
 SCORES = each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.json")
 STUDIED = [study.name for study in settings.studies]
 STUDIES = expand(f"{R}/studies/{{study}}/runs.csv", study=STUDIED)
+TRACKED_STUDIES = expand(f"{R}/mlflow/study-{{study}}.json", study=STUDIED)
 TABLES = expand(
     f"{R}/tables/{{name}}.csv", name=[*TABLE_NAMES, *(f"study-{study}" for study in STUDIED)]
 )

@@ -21,7 +21,7 @@ rule mlflow_store:
         mem_mb=2000,
         runtime=10,
     params:
-        job=job("mlflow_store", SETTINGS["tracking"]),
+        job=job("mlflow_store", SETTINGS["tracking"], studies=STUDIED),
     message:
         "Making the MLflow store"
     script:
@@ -63,3 +63,31 @@ rule track:
         "Logging every training to MLflow"
     script:
         "../scripts/track.py"
+
+
+rule track_studies:
+    input:
+        store=f"{R}/mlflow/store.json",
+        runs=STUDIES,
+    output:
+        runs=TRACKED_STUDIES,
+        provenance=f"{R}/mlflow/studies.provenance.json",
+    log:
+        f"{R}/logs/track_studies.log",
+    benchmark:
+        f"{R}/benchmarks/track_studies.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        job=job(
+            "track_studies",
+            SETTINGS["tracking"],
+            dataset=settings.dataset,
+            studies=SETTINGS["studies"],
+        ),
+    message:
+        "Logging the studies to MLflow"
+    script:
+        "../scripts/track_studies.py"

@@ -5,8 +5,11 @@ import adapter
 
 def mlflow_store(job: adapter.Job) -> None:
     from scenenet.tracking import TrackingSettings, create_store
+    from scenenet.tracking.studies import experiment_of
 
-    create_store(TrackingSettings(**job.settings), job.output.store)
+    settings = TrackingSettings(**job.settings)
+    names = [experiment_of(settings, study).experiment for study in job.identity["studies"]]
+    create_store(settings, job.output.store, names)
 
 
 adapter.run(mlflow_store)

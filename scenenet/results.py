@@ -132,6 +132,11 @@ class Results:
             model_files=self._files("models", model, f"seed-{seed}"),
         )
 
+    def scene(self, rank: str) -> Mapping[str, Any] | None:
+        """The best, median or worst test crop as voxels; None if it was not made."""
+        path = self.folder / "scenes" / f"{rank}.json"
+        return read_result(path) if path.exists() else None
+
     def study_runs(self, study: str) -> pd.DataFrame | None:
         """A row per variant and seed of a study; None if it was not run."""
         path = self.folder / "studies" / study / "runs.csv"

@@ -133,8 +133,8 @@ def draw_grids(results: Results, reference: str, out: Path) -> tuple[str, str]:
     from scenenet.figures.scenes import voxel_grids
     from scenenet.voxels import VoxelGrid, voxelise
 
-    sample = _ranked(_champion(results, reference), "best")
-    cloud = _crop(results, sample)
+    sample = ranked(champion_of(results, reference), "best")
+    cloud = crop_cloud(results, sample)
     grids = {}
     for resolution in GRID_RESOLUTIONS:
         voxels = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution))
@@ -205,7 +205,7 @@ def draw_kernels(results: Results, model: str, out: Path) -> tuple[str, str]:
     from scenenet.modelfile import read_model
     from scenenet.models import CNN, SceneNet
 
-    champion = _champion(results, model)
+    champion = champion_of(results, model)
     trained, _ = read_model(champion.model_files[0])
     parts: dict[str, np.ndarray] = {}
     with torch.no_grad():
@@ -243,11 +243,11 @@ def draw_parameters(results: Results, model: str, out: Path) -> tuple[str, str]:
 def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[str, str]:
     from scenenet.figures.scenes import View, side_views
 
-    chosen_by = _champion(results, reference)
-    sample = _ranked(chosen_by, rank)
-    cloud = _crop(results, sample)
-    views = [View("labels", _class_groups(cloud), "class")]
-    views += [_probability(cloud, _champion(results, model)) for model in results.models]
+    chosen_by = champion_of(results, reference)
+    sample = ranked(chosen_by, rank)
+    cloud = crop_cloud(results, sample)
+    views = [View("labels", class_groups(cloud), "class")]
+    views += [_probability(cloud, champion_of(results, model)) for model in results.models]
     keep = _thin(len(cloud))
     thinned = [replace(view, values=view.values[keep]) for view in views]
     return side_views(cloud.xyz[keep], thinned, out), (
@@ -278,7 +278,7 @@ def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]
     )
 
 
-def _ranked(champion: SeedResult, rank: str) -> Mapping[str, Any]:
+def ranked(champion: SeedResult, rank: str) -> Mapping[str, Any]:
     """The best, median or worst test crop by F0.5; ties by name."""
     ordered = sorted(champion.evaluation["per_sample"], key=lambda s: (-s["f05"], s["id"]))
     if not ordered:
@@ -286,7 +286,8 @@ def _ranked(champion: SeedResult, rank: str) -> Mapping[str, Any]:
     return {"best": ordered[0], "median": ordered[len(ordered) // 2], "worst": ordered[-1]}[rank]
 
 
-def _crop(results: Results, sample: Mapping[str, Any]) -> PointCloud:
+def crop_cloud(results: Results, sample: Mapping[str, Any]) -> PointCloud:
+    """The points of a test crop, ``sample`` being its entry in an evaluation."""
     from scenenet.pointcloud import PointCloud, class_scheme
     from scenenet.store import StoreReader
 
@@ -298,7 +299,7 @@ def _crop(results: Results, sample: Mapping[str, Any]) -> PointCloud:
     return PointCloud(arrays["xyz"], arrays["classification"], scheme)
 
 
-def _class_groups(cloud: PointCloud) -> np.ndarray:
+def class_groups(cloud: PointCloud) -> np.ndarray:
     """(N,) what each point is, as ``figures.CLASS_COLOURS`` names it."""
     groups = np.full(len(cloud), "other", dtype="U10")
     for name in ("ground", "vegetation", "wire", "tower"):
@@ -345,7 +346,12 @@ def _thin(n: int) -> np.ndarray:
     return np.arange(0, n, max(1, -(-n // POINTS_PER_PICTURE)))
 
 
-def _champion(results: Results, model: str) -> SeedResult:
+def champion_of(results: Results, model: str) -> SeedResult:
+    """The seed that is best on validation.
+
+    Raises:
+        InputError: the model has not been tuned.
+    """
     champion = results.champion(model)
     if champion is None or not champion.model_files:
         raise InputError(f"no tuned model called {model}", file=results.folder / "models" / model)

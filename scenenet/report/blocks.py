@@ -95,6 +95,19 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Scene:
+    """A crop that can be turned; ``data`` is of ``scenenet.scenes3d``."""
+
+    name: str
+    title: str
+    caption: str
+    alt: str
+    colourings: Sequence[tuple[str, str]]
+    data: Mapping[str, Any]
+    kind: str = "scene"
+
+
+@dataclass(frozen=True)
 class Heading:
     """A part of a section that the contents list does not name."""
 
@@ -102,7 +115,7 @@ class Heading:
     kind: str = "heading"
 
 
-Block = Text | Notes | Facts | Table | Figure | Heading
+Block = Text | Notes | Facts | Table | Figure | Scene | Heading
 
 
 @dataclass

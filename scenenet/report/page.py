@@ -72,8 +72,9 @@ def render(made: Sequence[Section], title: str, source: str) -> str:
     )
     environment.filters |= {"data_uri": data_uri, "png_size": png_size}
     style = Markup((HERE / "style.css").read_text(encoding="utf-8"))
+    script = Markup((HERE / "page.js").read_text(encoding="utf-8"))
     page = environment.get_template("page.html")
-    return page.render(title=title, sections=made, style=style, source=source)
+    return page.render(title=title, sections=made, style=style, script=script, source=source)
 
 
 def data_uri(path: Path) -> str:

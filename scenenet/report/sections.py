@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenenet.figures import Picture, plan, read_pictures
+from scenenet.figures import CROP_RANKS, Picture, plan, read_pictures
 from scenenet.published import Thesis
 from scenenet.report.blocks import (
     Block,
@@ -19,6 +19,7 @@ from scenenet.report.blocks import (
     Facts,
     Figure,
     Notes,
+    Scene,
     Section,
     Table,
     Text,
@@ -281,13 +282,41 @@ def learned(material: Material) -> Section | None:
 
 def crops(material: Material) -> Section | None:
     """Figures 5.8 and 5.9."""
-    blocks = material.figures("crops")
+    blocks = [*_scenes(material), *material.figures("crops")]
     if not blocks:
         return None
     said = Text(
         "Three test crops chosen by rule: the one with the highest, the middle and the lowest F0.5."
     )
     return Section("crops", "Right and wrong", [said, *blocks])
+
+
+def _scenes(material: Material) -> list[Block]:
+    """The crops that can be turned (thesis Figures 5.6, 5.8, 5.9)."""
+    made: list[Block] = []
+    for rank in CROP_RANKS:
+        data = material.results.scene(rank)
+        if data is None:
+            continue
+        geneos = [(name, f"part of the {name.replace('_', ' ')}") for name in data["shares"]]
+        said = "what was found", "class", "probability"
+        colourings = [*zip(("found", "class", "probability"), said, strict=True), *geneos]
+        n = len(data["true"])
+        made.append(
+            Scene(
+                rank,
+                f"The {rank} test crop, to be turned",
+                f"Crop {data['crop']} in voxels of {data['voxel_size']:.2f} m, as {data['model']} "
+                f"(seed {data['seed']}) answers it. Drag to turn it, or use the arrow keys, + and "
+                "-. Found: green is right, orange is no tower, pink was missed. A part is red "
+                "where an operator adds to the answer and blue where it takes away. The scores "
+                f"count all voxels of the grid; the slider has {n - 1} thresholds.",
+                f"The occupied voxels of crop {data['crop']} in space.",
+                colourings,
+                data,
+            )
+        )
+    return made
 
 
 def training(material: Material) -> Section | None:

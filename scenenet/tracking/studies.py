@@ -15,7 +15,10 @@ from scenenet.tracking.store import TrackingSettings
 if TYPE_CHECKING:
     import pandas as pd
 
-FACTS = ("training_crops", "parameters", "epochs", "loss", "training_seconds", "inference_ms")
+FACTS = (
+    "tau", "alive", "training_crops", "parameters", "epochs", "loss", "training_seconds",
+    "inference_ms",
+)  # fmt: skip
 
 
 def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
@@ -73,9 +76,10 @@ def study_groups(study: StudySettings, runs: pd.DataFrame, dataset: str) -> list
 
 
 def _metrics(row: Mapping[str, Any], part: str) -> dict[str, float | None]:
-    scores = {f"{part}_{name}": float(row[name]) for name in (*SCORES, "average_precision")}
-    facts = {name: float(row[name]) for name in FACTS}
-    return scores | facts | {"tau": float(row["tau"]), "alive": float(row["alive"])}
+    metrics: dict[str, float | None] = {name: float(row[name]) for name in FACTS}
+    for name in (*SCORES, "average_precision"):
+        metrics[f"{part}_{name}"] = float(row[name])
+    return metrics
 
 
 def _means(seeds: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:

@@ -10,7 +10,7 @@ from snakemake.exceptions import WorkflowError
 from scenenet.codehash import code_hash
 from scenenet.config import load
 from scenenet.errors import InputError
-from scenenet.figures import plan
+from scenenet.figures import CROP_RANKS, plan
 from scenenet.files import digest
 from scenenet.provenance import fingerprint
 from scenenet.results import Results

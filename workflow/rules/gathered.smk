@@ -10,6 +10,19 @@ def each_training(pattern):
     ]
 
 
+def each_seed_of(model):
+    """What a model's best seed is told by, and the models themselves."""
+    return [
+        file
+        for seed in settings.seeds
+        for file in (
+            f"{R}/evaluate/{model}/seed-{seed}.json",
+            f"{R}/tune/{model}/seed-{seed}.json",
+            tuned_file(model, seed),
+        )
+    ]
+
+
 def gathered(models=None, surveys=TRAIN, predicted=(), studies=()):
     """The arguments of ``scenenet.results.Results``. Models are pairs, because their order counts
     and that of a dict does not survive in a parameter."""
@@ -69,6 +82,7 @@ TUNINGS = [
     *(tuned_file(model.name, seed) for model in settings.models for seed in settings.seeds),
 ]
 SCORES = each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.json")
+SCENES = expand(f"{R}/scenes/{{rank}}.json", rank=CROP_RANKS)
 STUDIED = [study.name for study in settings.studies]
 STUDIES = expand(f"{R}/studies/{{study}}/runs.csv", study=STUDIED)
 TRACKED_STUDIES = expand(f"{R}/mlflow/study-{{study}}.json", study=STUDIED)
@@ -102,6 +116,7 @@ RECORDS = [
     *expand(f"{R}/models/{{model}}.provenance.json", model=[m.name for m in settings.models]),
     *expand(f"{R}/predict/{{survey}}/provenance.json", survey=NEW),
     *expand(f"{R}/studies/{{study}}/provenance.json", study=STUDIED),
+    *expand(f"{R}/scenes/{{rank}}.provenance.json", rank=CROP_RANKS),
     f"{R}/tables/provenance.json",
     f"{R}/figures/provenance.json",
     f"{R}/mlflow/provenance.json",

@@ -173,8 +173,41 @@ rule study_figure:
         "../scripts/figures.py"
 
 
+rule scene:
+    input:
+        stores=CROP_STORES,
+        manifests=CROP_MANIFESTS,
+        scores=each_seed_of(settings.predict.model),
+    output:
+        scene=f"{R}/scenes/{{rank}}.json",
+        provenance=f"{R}/scenes/{{rank}}.provenance.json",
+    log:
+        f"{R}/logs/scene/{{rank}}.log",
+    benchmark:
+        f"{R}/benchmarks/scene/{{rank}}.tsv"
+    wildcard_constraints:
+        rank=any_of(CROP_RANKS),
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        job=lambda w: job(
+            "scene",
+            {},
+            results=gathered(models=[settings.model_named(settings.predict.model)]),
+            model=settings.predict.model,
+            rank=w.rank,
+        ),
+    message:
+        "Making the {wildcards.rank} test crop ready to be turned"
+    script:
+        "../scripts/scene.py"
+
+
 rule report:
     input:
+        scenes=SCENES,
         tables=TABLES,
         pictures=[file for names in pictures(ALL_PICTURES).values() for file in names],
         scores=SCORES,

@@ -1,0 +1,159 @@
+"use strict";
+
+// Tables sort by the column whose heading is pressed: numbers by value, all else by letter, what is
+// not there last.
+for (const table of document.querySelectorAll("table")) {
+  const body = table.tBodies[0];
+  table.querySelectorAll("thead button").forEach((button, column) => {
+    button.addEventListener("click", () => {
+      const heading = button.closest("th");
+      const falling = heading.getAttribute("aria-sort") === "ascending";
+      for (const other of table.querySelectorAll("th")) other.removeAttribute("aria-sort");
+      heading.setAttribute("aria-sort", falling ? "descending" : "ascending");
+      const value = (row) => {
+        const text = row.cells[column].textContent.trim();
+        const number = parseFloat(text.replace(/[\u202f\s]/g, ""));
+        const numeric = heading.classList.contains("number");
+        return numeric ? (Number.isNaN(number) ? null : number) : text;
+      };
+      const rows = [...body.rows].map((row, place) => ({ row, place, value: value(row) }));
+      rows.sort((a, b) => {
+        if (a.value === null || b.value === null) return (a.value === null) - (b.value === null);
+        const order = typeof a.value === "number" ? a.value - b.value : a.value.localeCompare(b.value);
+        return (falling ? -order : order) || a.place - b.place;
+      });
+      body.append(...rows.map((entry) => entry.row));
+    });
+  });
+}
+
+const CLASS_COLOURS = { other: "#9aa5b1", ground: "#b08d57", vegetation: "#4c9a4c", wire: "#0072b2", tower: "#d62728" };
+const FOUND_COLOURS = { right: "#009e73", wrong: "#e69f00", missed: "#cc79a7", nothing: "#9aa5b133" };
+
+function unpack(text, Kind) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  return new Kind(bytes.buffer);
+}
+
+function mix(low, high, share) {
+  const part = (i) => Math.round(low[i] + (high[i] - low[i]) * share);
+  return `rgb(${part(0)},${part(1)},${part(2)})`;
+}
+
+// A crop that turns in the hand: voxels as squares, the nearest drawn last.
+class Scene {
+  constructor(figure) {
+    const data = JSON.parse(figure.querySelector("script").textContent);
+    this.data = data;
+    this.canvas = figure.querySelector("canvas");
+    this.colour = figure.querySelector("select");
+    this.slider = figure.querySelector("input");
+    this.said = figure.querySelector("output");
+    this.zyx = unpack(data.zyx, Int16Array);
+    this.classes = unpack(data.class, Uint8Array);
+    this.steps = unpack(data.steps, Uint16Array);
+    this.tower = unpack(data.tower, Uint8Array);
+    this.shares = Object.fromEntries(
+      Object.entries(data.shares).map(([name, text]) => [name, unpack(text, Int8Array)]));
+    this.n = this.tower.length;
+    this.turn = 0.6;
+    this.tilt = 0.35;
+    this.zoom = 1;
+    this.order = Uint32Array.from({ length: this.n }, (_, i) => i);
+    this.centre = [0, 1, 2].map((axis) => {
+      let low = Infinity, high = -Infinity;
+      for (let i = 0; i < this.n; i++) {
+        low = Math.min(low, this.zyx[3 * i + axis]);
+        high = Math.max(high, this.zyx[3 * i + axis]);
+      }
+      return [(low + high) / 2, high - low + 1];
+    });
+    this.slider.max = data.taus.length - 1;
+    this.slider.value = data.tau_step;
+    this.slider.addEventListener("input", () => { this.tell(); this.draw(); });
+    this.colour.addEventListener("change", () => this.draw());
+    this.canvas.addEventListener("pointerdown", (event) => this.canvas.setPointerCapture(event.pointerId));
+    this.canvas.addEventListener("pointermove", (event) => {
+      if (!event.buttons) return;
+      this.turn += event.movementX / 120;
+      this.tilt = Math.max(-1.5, Math.min(1.5, this.tilt + event.movementY / 120));
+      this.draw();
+    });
+    this.canvas.addEventListener("keydown", (event) => {
+      const step = { ArrowLeft: [-0.15, 0], ArrowRight: [0.15, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
+      const scale = { "+": 1.15, "-": 1 / 1.15 }[event.key];
+      if (!step && !scale) return;
+      event.preventDefault();
+      if (scale) this.zoom *= scale;
+      if (step) { this.turn += step[0]; this.tilt = Math.max(-1.5, Math.min(1.5, this.tilt + step[1])); }
+      this.draw();
+    });
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
+    this.tell();
+  }
+
+  // Precision and recall over all voxels of the grid, empty ones included, from the counts.
+  tell() {
+    const step = Number(this.slider.value);
+    const above = (counts) => counts.slice(step + 1).reduce((sum, count) => sum + count, 0);
+    const found = above(this.data.true), wrong = above(this.data.false);
+    const all = this.data.true.reduce((sum, count) => sum + count, 0);
+    const precision = found + wrong ? found / (found + wrong) : 0;
+    const recall = all ? found / all : 0;
+    const low = 0.25 * precision + recall;
+    const f05 = low ? (1.25 * precision * recall) / low : 0;
+    this.said.textContent = `tau ${this.data.taus[step]}: precision ${precision.toFixed(3)}, ` +
+      `recall ${recall.toFixed(3)}, F0.5 ${f05.toFixed(3)}`;
+  }
+
+  colours() {
+    const what = this.colour.value, step = Number(this.slider.value), n = this.data.taus.length;
+    if (what === "class") {
+      const named = this.data.classes.map((name) => CLASS_COLOURS[name]);
+      return (i) => named[this.classes[i]];
+    }
+    if (what === "probability") return (i) => mix([200, 206, 212], [214, 39, 40], Math.min(1, this.steps[i] / n));
+    if (what === "found") {
+      return (i) => {
+        if (this.steps[i] > step) return this.tower[i] ? FOUND_COLOURS.right : FOUND_COLOURS.wrong;
+        return this.tower[i] ? FOUND_COLOURS.missed : FOUND_COLOURS.nothing;
+      };
+    }
+    const share = this.shares[what];
+    return (i) => share[i] < 0 ? mix([225, 225, 225], [33, 102, 172], -share[i] / 100)
+      : mix([225, 225, 225], [178, 24, 43], share[i] / 100);
+  }
+
+  draw() {
+    const ratio = window.devicePixelRatio || 1;
+    const width = this.canvas.clientWidth * ratio, height = this.canvas.clientHeight * ratio;
+    if (!width) return;
+    if (this.canvas.width !== width || this.canvas.height !== height) {
+      this.canvas.width = width;
+      this.canvas.height = height;
+    }
+    const [z0, y0, x0] = this.centre.map((entry) => entry[0]);
+    const spread = Math.hypot(...this.centre.map((entry) => entry[1]));
+    const scale = (this.zoom * Math.min(width, height)) / spread;
+    const cosTurn = Math.cos(this.turn), sinTurn = Math.sin(this.turn);
+    const cosTilt = Math.cos(this.tilt), sinTilt = Math.sin(this.tilt);
+    const px = new Float32Array(this.n), py = new Float32Array(this.n), depth = new Float32Array(this.n);
+    for (let i = 0; i < this.n; i++) {
+      const z = this.zyx[3 * i] - z0, y = this.zyx[3 * i + 1] - y0, x = this.zyx[3 * i + 2] - x0;
+      const across = x * cosTurn - y * sinTurn, away = x * sinTurn + y * cosTurn;
+      px[i] = width / 2 + scale * across;
+      py[i] = height / 2 - scale * (z * cosTilt + away * sinTilt);
+      depth[i] = away * cosTilt - z * sinTilt;
+    }
+    this.order.sort((a, b) => depth[b] - depth[a]);
+    const context = this.canvas.getContext("2d");
+    context.clearRect(0, 0, width, height);
+    const colour = this.colours(), side = Math.max(1.5, scale * 0.95);
+    for (const i of this.order) {
+      context.fillStyle = colour(i);
+      context.fillRect(px[i] - side / 2, py[i] - side / 2, side, side);
+    }
+  }
+}
+
+for (const figure of document.querySelectorAll("figure.scene")) new Scene(figure).draw();

@@ -1,0 +1,99 @@
+"""A test crop as voxels that a page can turn: class, probability, contributions, and the counts at
+every threshold (thesis Figures 5.6, 5.8, 5.9)."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenenet.files import write_json
+from scenenet.results import Results
+
+CLASSES = ("other", "ground", "vegetation", "wire", "tower")
+"""What a voxel shows, the later where it holds several."""
+
+
+def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dict[str, Any]:
+    """Write the best, median or worst test crop of a model for the page.
+
+    Arrays are little-endian and in base64: ``zyx`` (M, 3) int16 voxels, ``class`` (M,) uint8 places
+    in ``classes``, ``steps`` (M,) uint16 thresholds that the probability reaches, ``tower`` (M,)
+    uint8 truth, and for a SCENE-Net ``shares`` by GENEO, (M,) int8 percent of the answer. ``true``
+    and ``false`` are the counts of all voxels of the grid, empty ones included, that reach i of the
+    thresholds ``taus``, so that scores at any of them can be told without the grid.
+
+    Args:
+        model: name of the model; its seed that is best on validation is shown.
+        rank: best, median or worst, by F0.5 over the test crops.
+        out: JSON file.
+
+    Raises:
+        InputError: the model has not been tuned and evaluated.
+    """
+    import torch
+
+    from scenenet.batches import batch
+    from scenenet.convolution import convolve_at_voxels
+    from scenenet.figures.drawings import champion_of, class_groups, crop_cloud, ranked
+    from scenenet.metrics import THRESHOLDS
+    from scenenet.modelfile import read_model
+    from scenenet.models import SceneNet
+    from scenenet.observer import count_reached
+    from scenenet.voxels import VoxelSettings, voxelise
+
+    champion = champion_of(results, model)
+    sample = ranked(champion, rank)
+    cloud = crop_cloud(results, sample)
+    trained, card = read_model(champion.model_files[0])
+    settings = VoxelSettings(fit=card.fit, resolution=card.resolution, voxel_size=card.voxel_size)
+    voxels = voxelise(cloud, settings.grid(cloud.xyz), sample["id"])
+    occupancy, towers = batch([voxels], card.measurement)
+    with torch.no_grad():
+        kernel, bias = trained.observer()
+        true, false = count_reached(occupancy, kernel, bias, towers, THRESHOLDS)
+        probability = trained(occupancy).numpy().reshape(-1)[voxels.index]
+        shares = {}
+        if isinstance(trained, SceneNet):
+            parts = convolve_at_voxels(occupancy, trained.weighted_kernels()).numpy()
+            whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
+            percent = np.rint(100 * parts / whole).astype("<i1")
+            shares = {name: _coded(row) for name, row in zip(trained.names, percent, strict=True)}
+    taus = THRESHOLDS.astype(probability.dtype)
+    zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
+    classes = _classes(class_groups(cloud), voxels.grid.voxel_of(cloud.xyz), voxels.index)
+    scene = {
+        "crop": sample["id"],
+        "rank": rank,
+        "model": model,
+        "seed": champion.seed,
+        "voxel_size": voxels.grid.voxel_size,
+        "classes": CLASSES,
+        "zyx": _coded(zyx.astype("<i2")),
+        "class": _coded(classes),
+        "steps": _coded(np.searchsorted(taus, probability, side="right").astype("<u2")),
+        "tower": _coded(voxels.tower.astype("<u1")),
+        "shares": shares,
+        "taus": [float(f"{tau:.6g}") for tau in THRESHOLDS],
+        "true": true.tolist(),
+        "false": false.tolist(),
+        "tau_step": int(np.argmin(np.abs(THRESHOLDS - card.threshold()))),
+    }
+    write_json(out, scene)
+    return scene
+
+
+def _classes(groups: np.ndarray, voxel: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """(M,) uint8 class of each occupied voxel: the last of ``CLASSES`` that it holds."""
+    codes = np.zeros(len(groups), np.uint8)
+    for code, name in enumerate(CLASSES):
+        codes[groups == name] = code
+    shown = np.zeros(len(index), np.uint8)
+    np.maximum.at(shown, np.searchsorted(index, voxel), codes)
+    return shown
+
+
+def _coded(array: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -1,0 +1,13 @@
+"""Make one test crop ready for the page's 3D view."""
+
+import adapter
+from gathered import results_of
+
+
+def scene(job: adapter.Job) -> None:
+    from scenenet.scenes3d import write_scene
+
+    write_scene(results_of(job), job.identity["model"], job.identity["rank"], job.output.scene)
+
+
+adapter.run(scene)

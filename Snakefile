@@ -34,7 +34,7 @@ rule all:
         models=[champion_file(model.name) for model in settings.models],
         predictions=expand(f"{R}/predict/{{survey}}/{{survey}}.laz", survey=NEW),
         store=list(STORE.values()),
-        runs=[f"{R}/mlflow/runs.json", *TRACKED_STUDIES],
+        runs=[f"{R}/mlflow/runs.json", f"{R}/mlflow/registry.json", *TRACKED_STUDIES],
         report=f"{R}/report/index.html",
     message:
         "All results are there"

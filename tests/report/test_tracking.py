@@ -10,13 +10,17 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
+import torch
 from mlflow import MlflowClient
 from mlflow.entities import ViewType
 
+from scenenet.convolution import Occupancy
 from scenenet.errors import InputError
 from scenenet.figures import draw_all, plan
+from scenenet.modelfile import read_model
 from scenenet.results import Results
 from scenenet.studies.run import COLUMNS
 from scenenet.studies.settings import StudySettings
@@ -29,6 +33,7 @@ from scenenet.tracking import (
     model_groups,
     store_id,
 )
+from scenenet.tracking.registry import register_champions
 from scenenet.tracking.studies import experiment_of, study_groups
 
 
@@ -321,3 +326,51 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(set
     assert logged["E"].tags["study"] == "ablations"
     again = log_runs(own, groups, tmp_path / "runs.json")
     assert {run["status"] for run in again["runs"].values()} == {"kept"}
+
+
+def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
+    settings, results, tmp_path
+):
+    groups = model_groups(results, "toys")
+    log_runs(settings, groups, tmp_path / "runs.json")
+    told = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
+    registered = register_champions(*told)
+    best = results.champion("scenenet")
+    assert registered["scenenet"]["seed"] == best.seed
+    assert registered["scenenet"]["version"] == 1
+    grids = np.zeros((3, 9, 8, 7), np.float32)
+    grids[0, 2:7, 3, 3] = grids[2, 4, 4, 4] = 1
+    # In a process of its own, as somebody else would load it.
+    np.save(tmp_path / "grids.npy", grids)
+    code = (
+        "import sys, numpy as np, mlflow; mlflow.set_tracking_uri(sys.argv[1]);"
+        "model = mlflow.pyfunc.load_model('models:/scenenet-scenenet@champion');"
+        "grids = np.load(sys.argv[2] + '/grids.npy');"
+        "np.save(sys.argv[2] + '/all.npy', model.predict(grids));"
+        "np.save(sys.argv[2] + '/one.npy', model.predict(grids[2:]))"
+    )
+    command = [sys.executable, "-c", code, settings.uri, str(tmp_path)]
+    subprocess.run(command, check=True, capture_output=True)
+    answer = np.load(tmp_path / "all.npy")
+    assert answer.shape == grids.shape
+    np.testing.assert_array_equal(np.load(tmp_path / "one.npy")[0], answer[2])
+    model, _ = read_model(best.model_files[0])
+    indices = [np.flatnonzero(grid) for grid in grids]
+    with torch.no_grad():
+        expected = model(Occupancy.of_grids(indices, None, (9, 8, 7))).numpy()
+    np.testing.assert_allclose(answer, expected, atol=1e-6)
+
+    again = register_champions(*told)
+    assert again["scenenet"]["version"] == 1, "the same champion is no new version"
+    # Another seed takes the lead: the alias moves on, the first version stays.
+    better = results.folder / "tune" / "scenenet" / f"seed-{1 - best.seed}.json"
+    tuning = json.loads(better.read_text())
+    tuning["validation"]["f05"] = 0.99
+    better.write_text(json.dumps(tuning))
+    changed = Results(results.folder, results.models, results.seeds, results.surveys)
+    log_runs(settings, model_groups(changed, "toys"), tmp_path / "runs.json")
+    moved = register_champions(settings, changed, *told[2:])
+    assert (moved["scenenet"]["seed"], moved["scenenet"]["version"]) == (1 - best.seed, 2)
+    client = MlflowClient(tracking_uri=settings.uri)
+    assert client.get_model_version_by_alias("scenenet-scenenet", "champion").version == 2
+    assert len(client.search_model_versions("name = 'scenenet-scenenet'")) == 2

@@ -91,3 +91,27 @@ rule track_studies:
         "Logging the studies to MLflow"
     script:
         "../scripts/track_studies.py"
+
+
+rule register:
+    input:
+        runs=f"{R}/mlflow/runs.json",
+        tunings=TUNINGS,
+        scores=SCORES,
+    output:
+        registry=f"{R}/mlflow/registry.json",
+        provenance=f"{R}/mlflow/registry.provenance.json",
+    log:
+        f"{R}/logs/register.log",
+    benchmark:
+        f"{R}/benchmarks/register.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=10,
+    params:
+        job=job("register", SETTINGS["tracking"], dataset=settings.dataset, results=gathered()),
+    message:
+        "Registering the best seed of each model in MLflow"
+    script:
+        "../scripts/register.py"

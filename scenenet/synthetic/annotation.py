@@ -20,12 +20,13 @@ from scenenet.synthetic.noise import Raster, stream
 HALF_SIDE_M = 1.9
 """Half the side of the prism at strength 0.5."""
 
-BESIDE_FOOT_M = 1.1
-"""The prism of a broad tower goes so far beyond its foot."""
+BROAD_M, BESIDE_FOOT_M = 0.8, 1.9
+"""Half the side of the foot from which on a tower is broad. Its prism goes so far beyond the foot,
+and the ground in it becomes tower as well: pylons have as many wrong labels as poles."""
 
 TAKEN = (SCRUB, TREE, LOW, TALL)
 GROUND_PATCH_M = 0.4
-"""Beyond strength 0.5 the ground itself becomes tower, up to this height."""
+"""At poles the ground itself becomes tower only beyond strength 0.5; up to this height."""
 
 
 def annotate(
@@ -52,11 +53,13 @@ def annotate(
         return labels
     for number, tower in towers:
         hand = stream(seed, TOWER_STREAM, number)
-        side = max(HALF_SIDE_M, tower.structure.half_base + BESIDE_FOOT_M) * np.sqrt(2 * strength)
+        broad = tower.structure.half_base > BROAD_M
+        side = tower.structure.half_base + BESIDE_FOOT_M if broad else HALF_SIDE_M
+        side *= np.sqrt(2 * strength)
         half_along, half_across = side * hand.uniform(0.9, 1.1, 2)
         shift = hand.uniform(-0.2, 0.2, 2)
         coverage = min(1.0, 2 * strength) * hand.uniform(0.92, 1.0)
-        patch = max(0.0, 2 * strength - 1) * hand.uniform(0.3, 0.9)
+        patch = max(min(1.0, 2 * strength) * broad, 2 * strength - 1) * hand.uniform(0.4, 0.9)
         reach = side + 1.0 + np.abs(tower.structure.attachments[:, 0]).max()
         near = np.flatnonzero(
             (np.abs(xyz[:, 0] - tower.x) < reach) & (np.abs(xyz[:, 1] - tower.y) < reach)
@@ -70,7 +73,7 @@ def annotate(
         inside = beside & (np.abs(across) < half_across)
         # Wires hold on at the arms, which may be wider than the prism.
         taken = (inside & np.isin(classes, TAKEN)) | (beside & (classes == WIRE))
-        if patch:
+        if patch > 0:
             above = points[:, 2] - terrain.bilinear(points[:, 0], points[:, 1])
             low = inside & (above < GROUND_PATCH_M) & (classes != STRAY)
             taken |= low & (rng.random(len(near)) < patch)

@@ -100,7 +100,7 @@ class SyntheticSettings(Settings):
         0.2, description="share of the returns near open ground that grass and scrub give"
     )
     penetration: Share = Field(
-        0.08,
+        0.05,
         description="share of the pulses that pass 5 m of crown; openings between the branches"
         " let more through",
     )
@@ -123,7 +123,7 @@ class SyntheticSettings(Settings):
         " throw shadows, and below it that most stray returns are",
     )
     tower_density: float = Field(
-        13.0, ge=1.0, le=500.0, description="points per m^2 of surface of tower members"
+        10.5, ge=1.0, le=500.0, description="points per m^2 of surface of tower members"
     )
     wire_returns: Share = Field(
         0.75, description="share of the scan lines that give a point on a wire"

@@ -142,7 +142,7 @@ class Vegetation:
     def _thickness(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Thickets and open crowns: logarithm of the density of the foliage."""
         stand = value_noise(x, y, STAND_M, self._seeds["thicket"])
-        return 0.9 * stand + 1.1 * value_noise(x, y, THICKET_M, self._seeds["thicket detail"])
+        return 1.2 * stand + 1.2 * value_noise(x, y, THICKET_M, self._seeds["thicket detail"])
 
     def _plant_hedges(self, top: Raster, x: np.ndarray, y: np.ndarray, texture: np.ndarray) -> None:
         """Hedges grow where a slow field changes sign; divided by its slope that is a distance."""

@@ -29,7 +29,7 @@ rule all:
         trainings=TRAININGS,
         tunings=TUNINGS,
         scores=SCORES,
-        tables=TABLES,
+        tables=[*TABLES, COMPARISON],
         studies=STUDIES,
         models=[champion_file(model.name) for model in settings.models],
         predictions=expand(f"{R}/predict/{{survey}}/{{survey}}.laz", survey=NEW),

@@ -25,6 +25,7 @@ SECTIONS: Sequence[SectionMaker] = (
     sections.learned,
     sections.crops,
     study_sections.studies,
+    study_sections.thesis_and_ours,
     survey_sections.predictions,
     sections.data,
     sections.towers,

@@ -1,9 +1,19 @@
-"""The studies on the page: a question, a picture and a table each (thesis 5.2.7, 5.3)."""
+"""The studies on the page, and every published number beside ours (thesis 5.2.7, 5.3)."""
 
 from __future__ import annotations
 
-from scenenet.report.blocks import Block, Column, Figure, Heading, Section, Text, table
+from scenenet.comparison import (
+    BETTER,
+    NOT,
+    REPRODUCED,
+    SCORE_TOLERANCE,
+    TOLERANCE,
+    UNMEASURED,
+)
+from scenenet.report.blocks import Block, Column, Facts, Figure, Heading, Section, Text, table
 from scenenet.report.sections import VOXEL_SCORES, Material, beside
+
+VERDICTS = (REPRODUCED, BETTER, NOT, UNMEASURED)
 
 
 def studies(material: Material) -> Section | None:
@@ -32,3 +42,32 @@ def studies(material: Material) -> Section | None:
         source = f"tables/study-{study.name}.csv"
         blocks.append(table(frame, columns, caption, source, folded=True))
     return Section("studies", "What it depends on", blocks) if blocks else None
+
+
+def thesis_and_ours(material: Material) -> Section | None:
+    """Every number of ``config/thesis.yaml`` with ours and a verdict."""
+    frame = material.table("thesis_and_ours")
+    if frame is None:
+        return None
+    counts = frame["verdict"].value_counts()
+    facts = [(verdict, str(counts.get(verdict, 0))) for verdict in VERDICTS]
+    columns = [
+        Column("place", "thesis"),
+        Column("what", "number"),
+        Column("thesis", "published", "number", "spread", published=True),
+        Column("low", "from", "number", published=True),
+        Column("high", "to", "number", published=True),
+        Column("ours", "ours", "number"),
+        Column("unit", "unit"),
+        Column("verdict", "verdict"),
+        Column("remark", "why"),
+    ]
+    caption = (
+        f"Every published number. {REPRODUCED}: inside the published range, within "
+        f"{SCORE_TOLERANCE:g} for a score, within {TOLERANCE:.0%} for anything else. {BETTER}: a "
+        "higher score or a shorter time than that. The first model of each architecture speaks for "
+        "it, with its mean over all seeds."
+    )
+    shown = frame.fillna({"unit": "", "remark": ""})
+    found = table(shown, columns, caption, "tables/thesis_and_ours.csv", folded=True)
+    return Section("thesis", "Thesis and ours", [Facts(facts), found])

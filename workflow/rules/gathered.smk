@@ -89,6 +89,7 @@ TRACKED_STUDIES = expand(f"{R}/mlflow/study-{{study}}.json", study=STUDIED)
 TABLES = expand(
     f"{R}/tables/{{name}}.csv", name=[*TABLE_NAMES, *(f"study-{study}" for study in STUDIED)]
 )
+COMPARISON = f"{R}/tables/thesis_and_ours.csv"
 PROTOCOL = (
     f"{GRID}, split {settings.split.train:.0%} / {settings.split.validation:.0%} / "
     f"{settings.split.test:.0%} by stretch of line"

@@ -32,6 +32,7 @@ rule tables:
         thesis=ancient(settings.thesis),
     output:
         tables=TABLES,
+        comparison=COMPARISON,
         provenance=f"{R}/tables/provenance.json",
     log:
         f"{R}/logs/tables.log",
@@ -208,7 +209,7 @@ rule scene:
 rule report:
     input:
         scenes=SCENES,
-        tables=TABLES,
+        tables=[*TABLES, COMPARISON],
         pictures=[file for names in pictures(ALL_PICTURES).values() for file in names],
         scores=SCORES,
         tunings=TUNINGS,

@@ -5,11 +5,13 @@ from gathered import results_of
 
 
 def tables(job: adapter.Job) -> None:
+    from scenenet.comparison import write_comparison
     from scenenet.published import read_thesis
     from scenenet.tables import write_tables
 
-    results = results_of(job)
-    write_tables(results, read_thesis(job.input.thesis), results.folder / "tables")
+    results, thesis = results_of(job), read_thesis(job.input.thesis)
+    write_tables(results, thesis, results.folder / "tables")
+    write_comparison(results, thesis, job.output.comparison)
 
 
 adapter.run(tables)

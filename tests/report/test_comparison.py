@@ -1,0 +1,68 @@
+"""Every published number has its counterpart, or says why not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from scenenet.comparison import compare
+from scenenet.published import Published, Thesis
+from scenenet.results import Results
+from scenenet.studies.run import COLUMNS
+from scenenet.studies.settings import StudySettings
+
+
+def row(frame: pd.DataFrame, name: str) -> dict:
+    (found,) = frame[frame["name"] == name].to_dict("records")
+    return found
+
+
+def test_every_published_number_has_a_row_and_what_is_not_reproduced_a_reason(
+    results: Results, thesis: Thesis
+):
+    frame = compare(results, thesis)
+    assert list(frame["name"]) == list(thesis.numbers)
+    open_ = frame[frame["verdict"].isin(["not", "not measured"])]
+    assert (open_["remark"].str.len() > 20).all(), open_.loc[open_["remark"] == "", "name"]
+
+
+def test_scores_are_judged_by_the_first_model_of_each_architecture(
+    results: Results, thesis: Thesis
+):
+    frame = compare(results, thesis)
+    # 0.8 and 0.6 against 0.68; 0.4 and a dead one against 0.44; recall 0.2 against 0.16 and 0.26.
+    assert row(frame, "models.scenenet.precision")["ours"] == pytest.approx(0.7)
+    assert row(frame, "models.scenenet.precision")["verdict"] == "reproduced"
+    assert row(frame, "models.cnn.precision")["verdict"] == "not"
+    assert row(frame, "models.lift.precision")["ours"] == pytest.approx(50)
+    assert row(frame, "models.scenenet.parameters")["verdict"] == "reproduced"
+    assert row(frame, "voxelisation.64")["verdict"] == "better"
+    assert row(frame, "times.training")["ours"] == pytest.approx(8 / 60)
+    assert row(frame, "times.cnn.inference")["verdict"] == "not measured"
+
+
+def test_studies_stand_beside_the_tables_they_repeat(results: Results, thesis: Thesis):
+    study = StudySettings(
+        name="ablations", title="t", place="Table 5.5", asks="?", seeds=(0,),
+        variants=({"name": "A", "thesis": "ablation.a"}, {"name": "E", "thesis": "ablation.e"}),
+    )  # fmt: skip
+    runs = [dict.fromkeys(COLUMNS, 0.5) | {"variant": v, "seed": 0, "recall": r}
+            for v, r in (("A", 0.0), ("E", 0.3))]  # fmt: skip
+    folder = results.folder / "studies" / "ablations"
+    folder.mkdir(parents=True)
+    pd.DataFrame(runs).to_csv(folder / "runs.csv", index=False)
+    frame = compare(replace(results, studies=[study]), thesis)
+    assert row(frame, "ablation.a.recall")["verdict"] == "reproduced"
+    assert row(frame, "ablation.a.precision")["verdict"] == "better"
+    assert row(frame, "ablation.e.recall")["verdict"] == "better"
+    assert row(frame, "ablation.e.precision")["verdict"] == "not"
+    assert row(frame, "ablation.f.recall")["verdict"] == "not measured"
+
+
+def test_a_range_counts_as_reproduced_inside_and_not_outside(results: Results, thesis: Thesis):
+    for high, verdict in ((25, "not"), (35, "reproduced")):  # ours is 30 m
+        number = Published(low=10, high=high, place="5.1.2", what="height")
+        told = thesis.model_copy(update={"numbers": {**thesis.numbers, "towers.height": number}})
+        assert row(compare(results, told), "towers.height")["verdict"] == verdict

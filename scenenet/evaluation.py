@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,24 +37,44 @@ def evaluate(
 def score(
     model: VoxelModel, card: ModelCard, dataset: Dataset, detection: DetectionSettings
 ) -> dict[str, Any]:
-    """Voxel and tower scores at the model's tau over all samples.
+    """Voxel and tower scores of a model at its tau over all samples (see ``score_answers``)."""
+    seed = card.provenance.get("seed")
+
+    def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
+        return probabilities(model, sample, card.measurement)
+
+    return score_answers(card.name, seed, card.threshold(), answer, dataset, detection)
+
+
+def score_answers(
+    name: str,
+    seed: int | None,
+    tau: float,
+    answer: Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]],
+    dataset: Dataset,
+    detection: DetectionSettings,
+) -> dict[str, Any]:
+    """Voxel and tower scores at tau over all samples, of whatever answers them.
 
     Voxel scores come from the counts of all samples together, and all voxels of the grids count,
     empty ones included. ``voxel_occupied`` counts the occupied voxels alone, ``voxel_trivial`` is
     the model that never says tower, and ``alive`` says whether the model found any tower voxel.
 
+    Args:
+        name, seed: of the model.
+        answer: probability (V,) and truth (V,) bool of every voxel of a sample's grid.
+
     Returns:
         model, seed, alive, voxel, voxel_trivial, voxel_occupied, towers, per_sample, pr_curve and
         average_precision, all of plain numbers.
     """
-    tau = card.threshold()
     every, occupied = Confusion(), Confusion()
     curve = ThresholdCurve.empty()
     towers = TowerMatch(np.empty(0), 0, 0)
     per_sample = []
     pairs = list(zip(dataset.samples, dataset.crops, strict=True))
-    for sample, crop in track(pairs, f"{card.name}: crops scored"):
-        probability, truth = probabilities(model, sample, card.measurement)
+    for sample, crop in track(pairs, f"{name}: crops scored"):
+        probability, truth = answer(sample)
         counts = confusion(probability, truth, tau)
         every += counts
         occupied += confusion(probability[sample.index], truth[sample.index], tau)
@@ -76,8 +96,8 @@ def score(
         )
     shared = {"tau": tau, "n_samples": len(pairs)}
     return {
-        "model": card.name,
-        "seed": card.provenance.get("seed"),
+        "model": name,
+        "seed": seed,
         "alive": every.tp > 0,
         "voxel": every.scores() | shared,
         "voxel_trivial": every.without_predictions().scores() | shared,
@@ -111,3 +131,32 @@ def crop_towers(
         detection,
     )
     return match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)
+
+
+def evaluate_black_box(
+    voxel_manifests: Sequence[str | Path],
+    split: str | Path,
+    detection: DetectionSettings,
+    seeds: Sequence[int],
+    outs: Sequence[str | Path],
+) -> None:
+    """Train the black box from each seed, tune it on validation and score it on the test crops.
+
+    Args:
+        outs: JSON file of each seed: what ``score_answers`` says, and ``parameters``.
+    """
+    from scenenet import blackbox
+    from scenenet.files import write_json
+
+    parts = {
+        part: load(voxel_manifests, crops_in(split, part))
+        for part in ("train", "validation", "test")
+    }
+    for seed, out in zip(seeds, outs, strict=True):
+        grown = blackbox.fit(parts["train"].samples, blackbox.BlackBoxSettings(), seed)
+        model = blackbox.tune(grown, parts["validation"].samples)
+        tau = model.threshold()
+        scores = score_answers(
+            "black box", seed, tau, model.probabilities, parts["test"], detection
+        )
+        write_json(out, {"part": "test", "parameters": model.n_parameters()} | scores)

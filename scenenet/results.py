@@ -20,6 +20,10 @@ HISTORY_MEASURES = frozenset({"epoch", "loss", "fidelity", "penalty", "seconds",
 """Columns of a training history that are not parameters of the model."""
 
 
+BLACK_BOX = "black box"
+"""What tables call the boosted trees of ``scenenet.blackbox``."""
+
+
 @dataclass(frozen=True)
 class SeedResult:
     """One model trained from one seed, tuned and evaluated.
@@ -136,6 +140,13 @@ class Results:
         """The best, median or worst test crop as voxels; None if it was not made."""
         path = self.folder / "scenes" / f"{rank}.json"
         return read_result(path) if path.exists() else None
+
+    @cached_property
+    def black_box(self) -> list[SeedResult]:
+        """The black box from every seed it was trained with."""
+        paths = [self.folder / "black_box" / f"seed-{seed}.json" for seed in self.seeds]
+        found = [(seed, p) for seed, p in zip(self.seeds, paths, strict=True) if p.exists()]
+        return [SeedResult(BLACK_BOX, BLACK_BOX, seed, read_result(path)) for seed, path in found]
 
     def study_runs(self, study: str) -> pd.DataFrame | None:
         """A row per variant and seed of a study; None if it was not run."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from scenenet.files import atomic
 from scenenet.published import Published, Thesis
-from scenenet.results import Results, SeedResult
+from scenenet.results import BLACK_BOX, Results, SeedResult
 from scenenet.studies.summary import summarise
 
 if TYPE_CHECKING:
@@ -141,7 +141,8 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
 
     Up to three rows per model tell which trainings were counted: ``all seeds``, ``live seeds``
     (those that detect anything; only where some do not) and the one that is best on validation,
-    which is the one that predicts. The thesis counts useful trainings only (5.2.6).
+    which is the one that predicts. The thesis counts useful trainings only (5.2.6). The black box
+    (``scenenet.blackbox``) was trained, tuned and scored on the same crops.
     """
     import pandas as pd
 
@@ -163,6 +164,16 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
             row |= _mean_and_std(group, "voxel", SCORES)
             row |= _published_scores(thesis, kind)
             rows.append(row)
+    if results.black_box:
+        group = results.black_box
+        row = {
+            "model": BLACK_BOX,
+            "counted": "all seeds",
+            "n_seeds": len(group),
+            "live_share": sum(r.alive for r in group) / len(group),
+            "parameters": round(sum(r.evaluation["parameters"] for r in group) / len(group)),
+        }
+        rows.append(row | _mean_and_std(group, "voxel", SCORES))
     if results.trained:
         baseline = _mean_and_std(results.trained, "voxel_trivial", SCORES)
         scores = {name: baseline[name] for name in SCORES}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -147,3 +148,16 @@ def test_a_misspelt_published_number_is_named(tmp_path: Path):
     file.write_text("source: s\nnumbers:\n  a.b: {valu: 1, place: p}\n")
     with pytest.raises(InputError, match=r"numbers\.a\.b\.valu"):
         read_thesis(file)
+
+
+def test_the_black_box_stands_beside_the_models(results: Results, thesis: Thesis):
+    source = results.folder / "evaluate" / "scenenet" / "seed-0.json"
+    entry = json.loads(source.read_text()) | {"parameters": 1000}
+    for seed, precision in ((0, 0.9), (1, 0.7)):
+        entry["voxel"] = entry["voxel"] | {"precision": precision}
+        out = results.folder / "black_box" / f"seed-{seed}.json"
+        out.parent.mkdir(exist_ok=True)
+        out.write_text(json.dumps(entry))
+    found = row(tables.models(results, thesis), model="black box")
+    assert found["precision"] == pytest.approx(0.8)
+    assert (found["parameters"], found["n_seeds"]) == (1000, 2)

@@ -82,6 +82,7 @@ TUNINGS = [
     *(tuned_file(model.name, seed) for model in settings.models for seed in settings.seeds),
 ]
 SCORES = each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.json")
+BLACK_BOX = expand(f"{R}/black_box/seed-{{seed}}.json", seed=settings.seeds)
 SCENES = expand(f"{R}/scenes/{{rank}}.json", rank=CROP_RANKS)
 STUDIED = [study.name for study in settings.studies]
 STUDIES = expand(f"{R}/studies/{{study}}/runs.csv", study=STUDIED)
@@ -118,6 +119,7 @@ RECORDS = [
     *expand(f"{R}/predict/{{survey}}/provenance.json", survey=NEW),
     *expand(f"{R}/studies/{{study}}/provenance.json", study=STUDIED),
     *expand(f"{R}/scenes/{{rank}}.provenance.json", rank=CROP_RANKS),
+    f"{R}/black_box/provenance.json",
     f"{R}/tables/provenance.json",
     f"{R}/figures/provenance.json",
     f"{R}/mlflow/provenance.json",

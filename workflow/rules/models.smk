@@ -144,3 +144,27 @@ rule evaluate:
         "Scoring {wildcards.model} seed {wildcards.seed} on the test crops"
     script:
         "../scripts/evaluate.py"
+
+
+rule black_box:
+    input:
+        stores=VOXEL_STORES,
+        manifests=VOXEL_MANIFESTS,
+        split=f"{R}/split/split.csv",
+    output:
+        scores=BLACK_BOX,
+        provenance=f"{R}/black_box/provenance.json",
+    log:
+        f"{R}/logs/black_box.log",
+    benchmark:
+        f"{R}/benchmarks/black_box.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=120,
+    params:
+        job=job("black_box", SETTINGS["detection"], seeds=list(settings.seeds)),
+    message:
+        "Training and scoring the black box to compare with"
+    script:
+        "../scripts/black_box.py"

@@ -29,6 +29,7 @@ rule tables:
         tunings=TUNINGS,
         scores=SCORES,
         studies=STUDIES,
+        black_box=BLACK_BOX,
         thesis=ancient(settings.thesis),
     output:
         tables=TABLES,

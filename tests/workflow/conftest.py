@@ -81,6 +81,10 @@ class Project:
             inside[key] = value
         file.write_text(yaml.safe_dump(config))
 
+    def configured(self, name: str) -> Any:
+        """A setting as the configuration has it."""
+        return yaml.safe_load((self.folder / "config" / "config.yaml").read_text())[name]
+
     def edit(self, path: str, old: str, new: str) -> None:
         """Replace text that a file has once."""
         file = self.folder / path

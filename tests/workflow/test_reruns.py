@@ -21,11 +21,18 @@ SCORED = {
     "tables": 1,
     "figures": 1,
     "track": 1,
+    "register": 1,
+    "scene": 3,
     **PREDICTED,
 }
 """What follows from trained models: two of each kind."""
 
 TRAINED = {"train": 2, "train_cnn": 2, **SCORED}
+STUDIED = {"study": 1, "study_figure": 1, "track_studies": 1}
+"""There is one study, of one model."""
+BLACK_BOX = {"black_box": 1}
+LEARNED = {**TRAINED, **STUDIED, **BLACK_BOX}
+"""What follows from other crops."""
 SETTINGS = {"resolved_config": 1}
 """The settings are written down whenever there are others."""
 
@@ -51,7 +58,7 @@ def test_a_survey_to_train_on_makes_a_larger_dataset_and_reads_no_other_survey_a
     shutil.copy(project.folder / "data/own.laz", project.folder / "data/another.laz")
     project.add_row("another", "data/another.laz", "edp", "train")
     own = {"check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1}
-    assert project.planned() == {**own, "split": 1, **TRAINED}
+    assert project.planned() == {**own, "split": 1, **LEARNED}
 
 
 def test_touching_a_survey_runs_nothing(project):
@@ -88,7 +95,7 @@ def test_taking_a_survey_out_of_the_sheet_only_writes_the_report_again(project):
 def test_another_recipe_makes_one_synthetic_survey_anew(project):
     project.edit("config/config.yaml", "seed: 2", "seed: 22")
     own = {"synthesize": 1, "check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1}
-    assert project.planned() == {**SETTINGS, **own, "split": 1, **TRAINED}
+    assert project.planned() == {**SETTINGS, **own, "split": 1, **LEARNED}
 
 
 # Settings
@@ -96,13 +103,13 @@ def test_another_recipe_makes_one_synthetic_survey_anew(project):
 
 def test_another_emphasis_of_the_loss_trains_again_and_prepares_nothing(project):
     project.configure({"training.loss.alpha": 2.0})
-    assert project.planned() == {**SETTINGS, **TRAINED}
+    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED}
 
 
 def test_swapping_the_values_of_two_settings_trains_again(project):
     """Snakemake compares parameters as a set, in which they would look the same."""
     project.configure({"training.loss": {"alpha": 0.1, "epsilon": 5.0}})
-    assert project.planned() == {**SETTINGS, **TRAINED}
+    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED}
 
 
 def test_writing_a_default_down_changes_nothing(project):
@@ -112,31 +119,32 @@ def test_writing_a_default_down_changes_nothing(project):
 
 def test_a_setting_of_one_stage_runs_that_stage_and_what_follows(project):
     project.configure({"detection.eps": 7.0})
-    after = {"evaluate": 4, "tables": 1, "figures": 1, "track": 1, **PREDICTED}
-    assert project.planned() == {**SETTINGS, **after}
+    after = {"evaluate": 4, "tables": 1, "figures": 1, "track": 1, "register": 1, "scene": 3}
+    assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BLACK_BOX}
 
 
 def test_another_resolution_keeps_the_grids_there_are(project):
     project.configure({"voxels.resolution": 64})
-    assert project.planned() == {**SETTINGS, "voxels": 2, **TRAINED}
+    assert project.planned() == {**SETTINGS, "voxels": 2, **LEARNED}
     assert (project.results / "voxels/first/cube-32/manifest.json").exists()
 
 
 def test_predicting_with_another_model_trains_nothing(project):
     project.configure({"predict.model": "cnn"})
-    assert project.planned() == {**SETTINGS, **PREDICTED}
+    assert project.planned() == {**SETTINGS, **PREDICTED, "scene": 3}
 
 
 def test_one_more_seed_trains_only_that_seed(project):
     project.configure({"seeds": [0, 1, 2]})
     own = {"train": 1, "train_cnn": 1, "tune": 1, "tune_cnn": 1, "evaluate": 2}
-    assert project.planned() == {**SETTINGS, **TRAINED, **own}
+    assert project.planned() == {**SETTINGS, **TRAINED, **BLACK_BOX, **own}
 
 
 def test_one_seed_less_trains_nothing(project):
     project.configure({"seeds": [0]})
-    gathered = {"champion": 1, "champion_cnn": 1, "tables": 1, "figures": 1, "track": 1}
-    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED}
+    gathered = {"champion": 1, "champion_cnn": 1, "tables": 1, "figures": 1, "track": 1,
+                "register": 1, "scene": 3}  # fmt: skip
+    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BLACK_BOX}
 
 
 def test_one_more_model_leaves_the_others_alone(project):
@@ -144,8 +152,16 @@ def test_one_more_model_leaves_the_others_alone(project):
     models = [{"name": n, "kind": n} for n in ("scenenet", "cnn")]
     project.configure({"models": [*models, kernel]})
     own = {"train": 2, "tune": 2, "evaluate": 2, "champion": 1}
-    gathered = {"tables": 1, "figures": 1, "track": 1, "report": 1}
+    gathered = {"tables": 1, "figures": 1, "track": 1, "register": 1, "report": 1}
     assert project.planned() == {**SETTINGS, **own, **gathered}
+
+
+def test_another_study_runs_itself_and_what_shows_it(project):
+    study = {"name": "seeds", "title": "t", "place": "5.3", "asks": "?", "seeds": [0, 1]}
+    told = [*project.configured("studies"), {**study, "variants": [{"name": "as it is"}]}]
+    project.configure({"studies": told})
+    shown = {"tables": 1, "report": 1, "mlflow_store": 1, "track": 1, "register": 1}
+    assert project.planned() == {**SETTINGS, **STUDIED, **shown}
 
 
 # Code
@@ -170,14 +186,14 @@ def test_editing_a_docstring_or_a_comment_runs_nothing(project):
 def test_editing_the_training_loop_trains_again_and_prepares_nothing(project):
     with (project.folder / "scenenet/training.py").open("a") as stream:
         stream.write("NOTHING = 0\n")
-    assert project.planned() == TRAINED
+    assert project.planned() == LEARNED
 
 
 def test_a_new_kernel_trains_again(project):
     """All figures are drawn by one script, which knows the kernels."""
     kernels = project.folder / "scenenet/geneo/kernels"
     (kernels / "cone.py").write_text("# to come\nNOTHING = 0\n")
-    assert project.planned() == {**TRAINED, "tower_map": 2}
+    assert project.planned() == {**LEARNED, "tower_map": 2}
 
 
 def test_editing_the_report_writes_the_report_again(project):
@@ -210,12 +226,12 @@ def test_editing_a_script_runs_its_rule(project):
 @pytest.mark.parametrize("file", ["crops.zarr.zip", "manifest.json"])
 def test_a_deleted_store_or_manifest_is_made_again(project, file):
     (project.results / "crops/first" / file).unlink()
-    assert project.planned() == {"crops": 1, "split": 1, "voxels": 1, **TRAINED}
+    assert project.planned() == {"crops": 1, "split": 1, "voxels": 1, **LEARNED}
 
 
 def test_a_deleted_cache_of_voxels_is_made_again(project):
     (project.results / "voxels/second/cube-32/voxels.zarr.zip").unlink()
-    assert project.planned() == {"voxels": 1, **TRAINED}
+    assert project.planned() == {"voxels": 1, **TRAINED, **BLACK_BOX}
 
 
 @pytest.mark.parametrize(
@@ -233,7 +249,8 @@ def test_a_deleted_prediction_is_made_again(project):
 
 def test_a_deleted_mlflow_store_is_made_again_with_all_its_runs(project):
     (project.folder / "mlflow.db").unlink()
-    assert project.planned() == {"mlflow_store": 1, "track": 1, "report": 1}
+    logged = {"track": 1, "track_studies": 1, "register": 1}
+    assert project.planned() == {"mlflow_store": 1, **logged, "report": 1}
 
 
 def test_what_others_log_to_the_mlflow_store_runs_nothing(project):
@@ -243,5 +260,5 @@ def test_what_others_log_to_the_mlflow_store_runs_nothing(project):
 
 def test_other_published_numbers_are_put_beside_ours_without_training(project):
     project.edit("config/thesis.yaml", "source: ", "source: Once more, ")
-    tables = {"tables": 1, "figures": 1, "track": 1, "report": 1}
+    tables = {"tables": 1, "figures": 1, "study_figure": 1, "track": 1, "register": 1, "report": 1}
     assert project.planned() == tables

@@ -18,7 +18,8 @@ pytestmark = pytest.mark.workflow
 STAGES = {
     *("synthesize", "check", "towers", "crops", "voxels", "split"),
     *("train", "tune", "champion", "evaluate", "predict"),
-    *("tables", "figures", "track", "report"),
+    *("study", "black_box", "tables", "figures", "scene"),
+    *("track", "track_studies", "register", "report"),
 }
 
 
@@ -32,6 +33,13 @@ def test_a_run_ends_with_every_result(finished):
         "results/predict/own/own.laz",
         "results/predict/own/own.towers.geojson",
         "results/mlflow/runs.json",
+        "results/mlflow/registry.json",
+        "results/studies/ablations/runs.csv",
+        "results/tables/study-ablations.csv",
+        "results/tables/thesis_and_ours.csv",
+        "results/figures/study-ablations.png",
+        "results/black_box/seed-1.json",
+        "results/scenes/median.json",
         "results/report/index.html",
         "mlflow.db",
     ):
@@ -88,11 +96,13 @@ def test_the_model_file_names_code_settings_and_data(finished):
 def test_every_training_is_a_run_in_mlflow(finished):
     runs = read_json(finished.results / "mlflow/runs.json")["runs"]
     assert len(runs) == 2 * (1 + 2)  # a group and two seeds for each model
+    studied = read_json(finished.results / "mlflow/study-ablations.json")["runs"]
+    assert len(studied) == 2 * (1 + 1)  # two variants from one seed
     with sqlite3.connect(finished.folder / "mlflow.db") as store:
         (active,) = store.execute(
             "SELECT count(*) FROM runs WHERE lifecycle_stage = 'active'"
         ).fetchone()
-    assert active == len(runs)
+    assert active == len(runs) + len(studied)
 
 
 def test_rules_leave_a_benchmark_and_a_log(finished):

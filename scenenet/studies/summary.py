@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from scenenet.published import Thesis
+from scenenet.published import Published, Thesis
 from scenenet.studies.settings import StudySettings
 
 if TYPE_CHECKING:
@@ -39,8 +39,7 @@ def summarise(study: StudySettings, runs: pd.DataFrame, thesis: Thesis) -> pd.Da
         for name in ("parameters", "training_crops", "training_seconds", "inference_ms"):
             row[name] = group[name].mean()
         for name in PUBLISHED:
-            row[f"thesis_{name}"] = (
-                thesis.value(f"{variant.thesis}.{name}") if variant.thesis else None
-            )
+            number = thesis.number(f"{variant.thesis}.{name}") or Published(place="")
+            row |= {f"thesis_{name}": number.value, f"thesis_{name}_std": number.spread}
         rows.append(row)
     return pd.DataFrame(rows)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from scenenet.errors import InputError
@@ -19,6 +21,8 @@ from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
 from scenenet.results import Results
 from scenenet.scenes3d import write_scene
+from scenenet.studies.run import COLUMNS
+from scenenet.studies.settings import StudySettings
 from scenenet.tables import write_tables
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
@@ -96,6 +100,28 @@ def test_our_scores_stand_beside_those_of_the_thesis(page: Path):
     assert "0.70 ± 0.14" in text  # precision of SCENE-Net: 0.8 and 0.6
     assert "0.68 ± 0.08" in text  # Table 5.3
     assert "nothing detected" in text
+
+
+def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: Thesis):
+    study = StudySettings(
+        name="ablations", title="Which operators?", place="Table 5.5", asks="What does it need?",
+        seeds=(0, 1), variants=({"name": "E", "thesis": "ablation.e"}, {"name": "A"}),
+    )  # fmt: skip
+    rows = [dict.fromkeys(COLUMNS, 0.5) | {"variant": v, "seed": s, "precision": 0.3 + s / 10}
+            for v in "EA" for s in (0, 1)]  # fmt: skip
+    folder = results.folder / "studies" / "ablations"
+    folder.mkdir(parents=True)
+    pd.DataFrame(rows).to_csv(folder / "runs.csv", index=False)
+    studied = replace(results, studies=[study])
+    write_tables(studied, thesis, results.folder / "tables")
+    drawn = [drawing for drawing in plan(studied, thesis) if drawing.section == "studies"]
+    draw_all(drawn, results.folder / "figures")
+    write_report(studied, thesis, page)
+    found = read(page)
+    assert "studies" in [section["id"] for section in found.all("section")]
+    for said in ("Which operators?", "What does it need?", "0.35 ± 0.07", "0.68"):
+        assert said in found.text
+    assert any("E: precision 0.35" in (image["alt"] or "") for image in found.all("img"))
 
 
 def test_towers_of_a_classified_survey_are_listed_with_reasons(page: Path):

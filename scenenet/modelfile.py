@@ -13,12 +13,14 @@ from scenenet.errors import InputError
 from scenenet.files import atomic, write_json
 from scenenet.geneo import kernel_named
 from scenenet.models import CNN, SceneNet, VoxelModel
-from scenenet.protocol import KernelSize, Measurement
+from scenenet.protocol import FieldSettings, KernelSize, Measurement
 from scenenet.settings import Settings
 from scenenet.voxels import Fit
 
 FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
+METRIC_VERSION = 2
+"""Of a SCENE-Net in metres, which versions that know of none cannot read."""
 
 
 class ModelCard(Settings):
@@ -61,9 +63,10 @@ def suffix(kind: str) -> str:
 
 def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
     """Write ``model`` to ``path`` (``.json`` for SCENE-Net, ``.safetensors`` for the CNN)."""
+    model = model.at(card.voxel_size)
     head = {
         "format": FORMAT,
-        "format_version": FORMAT_VERSION,
+        "format_version": FORMAT_VERSION if model.field is None else METRIC_VERSION,
         "kind": model.kind,
         "kernel_size": list(model.kernel_size),
         **card.model_dump(),
@@ -106,20 +109,31 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
 def _numbers(model: SceneNet) -> dict[str, Any]:
     """The parameters of a SCENE-Net as a person would write them down."""
     values = model.shape_parameters()
+    metric = model.field is not None
     geneos = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         parameters = {
-            p.name: {"value": values[f"{name}.{p.name}"], "unit": p.unit, "meaning": p.meaning}
+            p.name: {
+                "value": values[f"{name}.{p.name}"],
+                "unit": p.metric_unit if metric else p.unit,
+                "meaning": p.meaning,
+            }
             for p in kernel_named(geneo).parameters
         }
         geneos.append({"name": name, "kernel": geneo, "parameters": parameters})
     mixing = {name: values[f"lambda.{name}"] for name in model.names}
-    return {"units": "voxel", "geneos": geneos, "mixing_weights": mixing}
+    numbers = {"units": "voxel", "geneos": geneos, "mixing_weights": mixing}
+    if model.field is None:
+        return numbers
+    return numbers | {"units": "m", "field": model.field.model_dump()}
 
 
 def _read_scenenet(data: Mapping[str, Any]) -> tuple[SceneNet, ModelCard]:
     _check_head(data)
-    model = SceneNet([entry["kernel"] for entry in data["geneos"]], _size(data))
+    geneos = [entry["kernel"] for entry in data["geneos"]]
+    metric = data["format_version"] == METRIC_VERSION
+    field = FieldSettings(**data["field"]) if metric else None
+    model = SceneNet(geneos, _size(data), field=field)
     numbers = {
         f"{entry['name']}.{symbol}": float(parameter["value"])
         for entry in data["geneos"]
@@ -127,7 +141,8 @@ def _read_scenenet(data: Mapping[str, Any]) -> tuple[SceneNet, ModelCard]:
     }
     mixing = {f"lambda.{name}": float(w) for name, w in data["mixing_weights"].items()}
     model.set_shape_parameters(numbers | mixing)
-    return model, _card(data)
+    card = _card(data)
+    return model.at(card.voxel_size), card
 
 
 def _read_cnn(path: Path) -> tuple[CNN, ModelCard]:
@@ -151,9 +166,10 @@ def _check_head(data: Mapping[str, Any]) -> None:
         raise InputError(
             "not a model file of scenenet", remedy="Name a file that scenenet train has written"
         )
-    if data["format_version"] != FORMAT_VERSION:
+    if data["format_version"] not in (FORMAT_VERSION, METRIC_VERSION):
         raise InputError(
-            f"model format {data['format_version']}, this version reads {FORMAT_VERSION}",
+            f"model format {data['format_version']}, this version reads "
+            f"{FORMAT_VERSION} and {METRIC_VERSION}",
             remedy="Use the version of scenenet that wrote it, or train it again",
         )
 

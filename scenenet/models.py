@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import copy
+import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import cast
+from typing import Self, cast
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
-from scenenet.convolution import Occupancy, convolve
+from scenenet.convolution import Occupancy, convolve, convolve_at_voxels
 from scenenet.errors import InputError
-from scenenet.geneo import Lattice, kernel_named
+from scenenet.geneo import Lattice, ShapeParameter, kernel_named
 from scenenet.observer import observe
-from scenenet.protocol import THESIS_GENEOS, KernelSize, ModelSettings
+from scenenet.protocol import THESIS_GENEOS, FieldSettings, KernelSize, ModelSettings
+from scenenet.sections import neighbours, section_offsets, strongest, whole_voxels
+
+COLUMN_M = 2.0
+"""Occupied metres of a tower's axis that the observer of a SCENE-Net in metres answers 1 to. It
+sets the scale of H alone: the twelve metres that the kernels reach then make no more than 6, where
+float32 still tells probabilities apart."""
 
 
 class VoxelModel(nn.Module):
@@ -22,10 +31,32 @@ class VoxelModel(nn.Module):
     Attributes:
         kind: name of the architecture in model files and tables.
         kernel_size: (kz, ky, kx) in voxels.
+        field: lengths of a model in metres; None where kernels are in voxels.
     """
 
     kind: str
     kernel_size: KernelSize
+    field: FieldSettings | None = None
+
+    def at(self, voxel_size: float) -> Self:
+        """The model for voxels of ``voxel_size`` m, sharing its numbers; itself where its kernels
+        are in voxels."""
+        return self
+
+    @property
+    def reach(self) -> tuple[int, int, int]:
+        """Voxels (z, y, x) to each side of a voxel that its answer depends on."""
+        kz, ky, kx = self.kernel_size
+        return kz // 2, ky // 2, kx // 2
+
+    def speakers(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
+        """(M,) row of the occupied voxel whose observation each one's answer is; its own unless
+        the model looks at whole sections of a tower.
+
+        Args:
+            observed: (M,) H at the occupied voxels.
+        """
+        return np.arange(len(observed))
 
     @abstractmethod
     def observer(self) -> tuple[Tensor, Tensor | None]:
@@ -45,6 +76,15 @@ class SceneNet(VoxelModel):
 
     With a cylinder, an arrow and a negative sphere it has eleven trained numbers: nine shape
     parameters and two mixing weights; the third is one minus the others.
+
+    Its kernels are in voxels as in the thesis, or, with ``field``, in metres. Then
+
+    - they are sampled at the voxel size of the grid (``at``), and H is weighted by it, so that a
+      column of a tower that is occupied over so many metres has the same answer on every grid;
+    - the parameters are kept as logits between their bounds, and the mixing weights as logits of
+      a softmax: whatever the numbers are, they are positive and convex;
+    - an empty voxel is no tower, and an occupied one is as much tower as the strongest in its
+      section of a tower (``scenenet.sections``).
     """
 
     kind = "scenenet"
@@ -54,13 +94,15 @@ class SceneNet(VoxelModel):
         geneos: Sequence[str] = THESIS_GENEOS,
         kernel_size: KernelSize = (9, 9, 9),
         *,
+        field: FieldSettings | None = None,
         generator: torch.Generator | None = None,
     ) -> None:
         """Draw the parameters at random from the ranges of the kernels (thesis 5.2.1).
 
         Args:
             geneos: names of kernels; a name may come more than once (thesis Table 5.5, F and G).
-            kernel_size: (kz, ky, kx) in voxels.
+            kernel_size: (kz, ky, kx) in voxels; follows from the lengths with ``field``.
+            field: lengths, for a model in metres; it begins at a voxel size of 1 m.
             generator: where the random numbers come from; torch's default if None.
 
         Raises:
@@ -70,6 +112,8 @@ class SceneNet(VoxelModel):
         if not geneos:
             raise InputError("a SCENE-Net needs at least one GENEO kernel")
         self.kernel_size = kernel_size
+        self.field = field
+        self.voxel_size = 1.0
         self.geneos = list(geneos)
         self.names = _distinct(self.geneos)
         self.shapes = nn.ModuleDict()
@@ -77,34 +121,114 @@ class SceneNet(VoxelModel):
             shape = nn.ParameterDict()
             for parameter in kernel_named(geneo).parameters:
                 drawn = torch.rand((), generator=generator)
-                drawn = parameter.low + (parameter.high - parameter.low) * drawn
+                if field is None:
+                    drawn = parameter.low + (parameter.high - parameter.low) * drawn
+                else:
+                    drawn = torch.logit(0.03 + 0.94 * drawn)
                 shape[parameter.name] = nn.Parameter(drawn)
             self.shapes[name] = shape
         self.mixing = nn.ParameterDict()
         highest = 2 / max(1, len(self.names) - 1)
         for name in self.names[:-1]:
-            self.mixing[name] = nn.Parameter(highest * torch.rand((), generator=generator))
+            drawn = torch.rand((), generator=generator)
+            drawn = highest * drawn if field is None else 6 * drawn - 3
+            self.mixing[name] = nn.Parameter(drawn)
+        if field is not None:
+            self._discretise(1.0)
+
+    def at(self, voxel_size: float) -> Self:
+        if self.field is None or voxel_size == self.voxel_size:
+            return self
+        other = copy.copy(self)  # shallow: the numbers are the same objects
+        other._discretise(voxel_size)
+        return other
+
+    def _discretise(self, voxel_size: float) -> None:
+        assert self.field is not None
+        up, down = (whole_voxels(m, voxel_size) for m in (self.field.above, self.field.below))
+        wide = 2 * whole_voxels(self.field.radius, voxel_size) + 1
+        # Centred on the voxel that it answers for, so as tall as the longer side; the other ends
+        # earlier (``kernels``).
+        self.kernel_size = (2 * max(up, down) + 1, wide, wide)
+        self.voxel_size = float(voxel_size)
+
+    @property
+    def reach(self) -> tuple[int, int, int]:
+        z, y, x = super().reach
+        if self.field is None:
+            return z, y, x
+        wide = whole_voxels(self.field.section_radius, self.voxel_size)
+        high = whole_voxels(self.field.section_above, self.voxel_size)
+        return z + high, y + wide, x + wide
+
+    def section(self, occupancy: Occupancy) -> tuple[np.ndarray, np.ndarray]:
+        """The occupied voxels in each one's section (``scenenet.sections.neighbours``)."""
+        assert self.field is not None
+        lengths = self.field.section_radius, self.field.section_above
+        return neighbours(occupancy, section_offsets(*lengths, self.voxel_size))
+
+    def speakers(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
+        if self.field is None:
+            return super().speakers(occupancy, observed)
+        return strongest(observed.detach().numpy(), *self.section(occupancy))
+
+    def forward(self, occupancy: Occupancy) -> Tensor:
+        """Probability of each voxel to hold a tower, (B, D, H, W) in [0, 1].
+
+        In metres, that of an empty voxel is 0 and there is no gradient.
+        """
+        if self.field is None:
+            return super().forward(occupancy)
+        kernel, _ = self.observer()
+        observed = convolve_at_voxels(occupancy, kernel.detach().cpu()[None])[0]
+        spoken = observed[torch.from_numpy(self.speakers(occupancy, observed))]
+        volume = torch.zeros(occupancy.n_voxels, dtype=observed.dtype)
+        volume[torch.from_numpy(occupancy.flat())] = torch.relu(torch.tanh(spoken))
+        return volume.reshape(len(occupancy), *occupancy.shape)
 
     def shape_of(self, name: str) -> dict[str, Tensor]:
         """Shape parameters of the GENEO called ``name``, by their symbol."""
-        return dict(cast(nn.ParameterDict, self.shapes[name]).items())
+        numbers = dict(cast(nn.ParameterDict, self.shapes[name]).items())
+        if self.field is None:
+            return numbers
+        ranges = {p.name: p.metric_range for p in self._parameters_of(name)}
+        return {
+            symbol: low * (high / low) ** torch.sigmoid(numbers[symbol])
+            for symbol, (low, high) in ranges.items()
+        }
+
+    def _parameters_of(self, name: str) -> tuple[ShapeParameter, ...]:
+        return kernel_named(self.geneos[self.names.index(name)]).parameters
 
     def mixing_weights(self) -> Tensor:
         """lambda, (K,), summing to one: the last is 1 minus the others (thesis 4.5)."""
         free = [self.mixing[name] for name in self.names[:-1]]
+        if self.field is not None:
+            return torch.softmax(torch.stack([*free, torch.zeros(())]), dim=0)
         last = torch.ones(()) - sum(free, torch.zeros(()))
         return torch.stack([*free, last])
 
     def kernels(self) -> Tensor:
         """The sampled kernels, (K, kz, ky, kx), before mixing."""
         device = next(self.parameters()).device
-        lattice = Lattice.of_size(self.kernel_size, device=device)
-        return torch.stack(
+        if self.field is None:
+            lattice = Lattice.of_size(self.kernel_size, device=device)
+        else:
+            lattice = Lattice.of_extent(
+                self.kernel_size, self.field.radius, self.voxel_size, device=device
+            )
+        sampled = torch.stack(
             [
                 kernel_named(geneo).sample(lattice, self.shape_of(name))
                 for name, geneo in zip(self.names, self.geneos, strict=True)
             ]
         )
+        if self.field is None or lattice.inside is None:
+            return sampled
+        ends = (lattice.z >= -self.field.below * (1 + 1e-6)) & (
+            lattice.z <= self.field.above * (1 + 1e-6)
+        )
+        return sampled * lattice.inside * ends * (self.voxel_size / COLUMN_M)
 
     def observer(self) -> tuple[Tensor, None]:
         return torch.einsum("k,kzyx->zyx", self.mixing_weights(), self.kernels()), None
@@ -144,6 +268,9 @@ class SceneNet(VoxelModel):
         total = sum(numbers[f"lambda.{name}"] for name in self.names)
         if abs(total - 1) > 1e-4:
             raise InputError(f"mixing weights sum to {total:.6f}, not to 1")
+        if self.field is not None:
+            self._set_logits(numbers)
+            return
         with torch.no_grad():
             for name in self.names:
                 for symbol, value in self.shape_of(name).items():
@@ -151,8 +278,45 @@ class SceneNet(VoxelModel):
             for name in self.names[:-1]:
                 self.mixing[name].fill_(numbers[f"lambda.{name}"])
 
+    def _set_logits(self, numbers: Mapping[str, float]) -> None:
+        for name in self.names:
+            shape = cast(nn.ParameterDict, self.shapes[name])
+            for parameter in self._parameters_of(name):
+                low, high = parameter.metric_range
+                value = numbers[f"{name}.{parameter.name}"]
+                if not low * (1 - 1e-4) <= value <= high * (1 + 1e-4):
+                    raise InputError(
+                        f"{name}.{parameter.name} = {value:g} {parameter.metric_unit} does not lie "
+                        f"within {low:g} to {high:g}"
+                    )
+                share = math.log(value / low) / math.log(high / low)
+                shape[parameter.name].data.fill_(_logit(share))
+        weights = [numbers[f"lambda.{name}"] for name in self.names]
+        if min(weights) < 0:
+            raise InputError("a mixing weight is negative")
+        for name, weight in zip(self.names[:-1], weights, strict=False):
+            self.mixing[name].data.fill_(math.log(max(weight, TINY) / max(weights[-1], TINY)))
+
+    def numbers(self) -> np.ndarray:
+        """The trained numbers as they are kept, (P,) float64, each kernel's and the mixing ones."""
+        return np.array([float(p.detach()) for p in self.parameters()])
+
+    def set_numbers(self, numbers: np.ndarray) -> None:
+        """Take what ``numbers`` gives."""
+        for parameter, value in zip(self.parameters(), numbers, strict=True):
+            parameter.data.fill_(float(value))
+
     def with_kernel_size(self, kernel_size: KernelSize) -> SceneNet:
-        """The same parameters sampled at another size (thesis 5.2.7, Table 5.4)."""
+        """The same parameters sampled at another size (thesis 5.2.7, Table 5.4).
+
+        Raises:
+            InputError: the kernels are in metres.
+        """
+        if self.field is not None:
+            raise InputError(
+                "the kernels of this SCENE-Net are in metres, and the grid sets their voxels",
+                remedy="Take a model of protocol thesis for other kernel sizes",
+            )
         other = SceneNet(self.geneos, kernel_size)
         other.load_state_dict(self.state_dict())
         return other
@@ -191,7 +355,20 @@ def new_model(settings: ModelSettings, seed: int) -> VoxelModel:
     generator = torch.Generator().manual_seed(seed)
     if settings.kind == "cnn":
         return CNN(settings.n_kernels, settings.kernel_size, generator=generator)
-    return SceneNet(settings.geneos, settings.kernel_size, generator=generator)
+    field = settings.field if settings.protocol == "field" else None
+    return SceneNet(settings.geneos, settings.kernel_size, field=field, generator=generator)
+
+
+TINY = 1e-9
+"""A mixing weight below it is read as this one."""
+LOGIT_END = 16.0
+"""Where a logit ends: float32 cannot tell a sigmoid beyond it from its bound."""
+
+
+def _logit(share: float) -> float:
+    if share <= 0 or share >= 1:
+        return LOGIT_END if share >= 1 else -LOGIT_END
+    return max(-LOGIT_END, min(LOGIT_END, math.log(share / (1 - share))))
 
 
 def _distinct(names: Sequence[str]) -> list[str]:

@@ -17,6 +17,43 @@ THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
 Measurement = Literal["presence", "density"]
 
 
+Protocol = Literal["thesis", "field"]
+
+
+class FieldSettings(Settings):
+    """A SCENE-Net in metres. None of these is trained; each has a reason (docs/accuracy.md)."""
+
+    radius: float = Field(3.0, gt=0, description="m, how far the kernels reach in plan")
+    above: float = Field(6.0, ge=0, description="m, how far they reach up")
+    below: float = Field(6.0, ge=0, description="m, how far they reach down")
+    section_radius: float = Field(
+        2.1,
+        ge=0,
+        description="m, half the mean width of a tower (thesis 5.1.2): a voxel is as much tower "
+        "as the one that is most so within this distance in plan",
+    )
+    section_above: float = Field(
+        2.0, ge=0, description="m, the same upwards, as a tower's foot has ground about it"
+    )
+    false_weight: float = Field(
+        2.0,
+        gt=0,
+        description="weight of a false voxel in the F0.5 that numbers and tau are chosen by: what "
+        "is right on the crops at hand is too bold elsewhere",
+    )
+
+
+class SearchSettings(Settings):
+    """How the eleven numbers of a SCENE-Net in metres are found."""
+
+    starts: int = Field(
+        256, ge=1, description="numbers drawn at first; the search begins at the best of them"
+    )
+    population: int = Field(16, ge=4, description="numbers tried in a generation")
+    generations: int = Field(100, ge=1, description="steps of the search")
+    step: float = Field(0.7, gt=0, description="first step size, in units of the logit")
+
+
 class LossSettings(Settings):
     """The GENEO loss (thesis 4.5)."""
 
@@ -29,6 +66,11 @@ class LossSettings(Settings):
 class TrainingSettings(Settings):
     """How a model is trained."""
 
+    init: Protocol = Field(
+        "thesis",
+        description="thesis: numbers drawn once; field: the best of many draws on the training "
+        "crops, and for a CNN the mean surroundings of tower voxels less those of others",
+    )
     epochs: int = Field(50, ge=1, description="passes over the training set")
     batch_size: int = Field(8, ge=1, description="crops a step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
@@ -44,6 +86,13 @@ class ModelSettings(Settings):
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$", description="name in results and tables")
     kind: Literal["scenenet", "cnn"] = Field(description="architecture")
+    protocol: Protocol = Field(
+        "thesis",
+        description="thesis: kernels in voxels, trained by gradient (thesis 5.2.1); field: a "
+        "SCENE-Net in metres, searched for, for use on real surveys (docs/accuracy.md)",
+    )
+    field: FieldSettings = FieldSettings()
+    search: SearchSettings = SearchSettings()
     geneos: tuple[str, ...] = Field(
         THESIS_GENEOS, min_length=1, description="kernels of a SCENE-Net; a name may be repeated"
     )

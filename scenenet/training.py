@@ -14,7 +14,9 @@ import torch
 
 from scenenet.batches import batch
 from scenenet.errors import InputError
+from scenenet.field import fit_field
 from scenenet.files import atomic, digest
+from scenenet.initialisation import informed_model
 from scenenet.losses import VoxelWeights, fidelity, negativity
 from scenenet.metrics import THRESHOLDS, ThresholdCurve
 from scenenet.modelfile import ModelCard, write_model
@@ -22,6 +24,7 @@ from scenenet.models import SceneNet, VoxelModel, new_model
 from scenenet.observer import count_reached
 from scenenet.progress import track
 from scenenet.protocol import Measurement, ModelSettings, TrainingSettings
+from scenenet.search import curve_of, scenes_of
 from scenenet.split import crops_in
 from scenenet.voxel_store import Dataset, load
 from scenenet.voxels import VoxelSample, VoxelSettings
@@ -85,6 +88,8 @@ def card_of(
             "data": digest(sorted(training.content)),
             "training_crops": len(training.samples),
             "training": model.training.model_dump(),
+            "protocol": model.protocol,
+            **({} if model.protocol == "thesis" else {"search": model.search.model_dump()}),
             "trained_kernel_size": list(model.kernel_size),
             **provenance,
         },
@@ -122,12 +127,17 @@ def fit(
             f"{settings.name} is to be trained on a GPU, and torch finds none",
             remedy="Set training.device to cpu, or install a torch that knows the GPU",
         )
-    model = new_model(settings, seed).to(protocol.device)
+    identity = _identity(training, validation, settings, seed)
+    if settings.protocol == "field" and settings.kind == "scenenet":
+        return fit_field(training, validation, settings, seed, identity, checkpoint=checkpoint)
+    if protocol.init == "field":
+        model = informed_model(settings, seed, training).to(protocol.device)
+    else:
+        model = new_model(settings, seed).to(protocol.device)
     optimiser = OPTIMISERS[protocol.optimiser](model.parameters(), lr=protocol.learning_rate)
     n_tower = sum(int(sample.tower.sum()) for sample in training)
     n_voxels = sum(sample.grid.n_voxels for sample in training)
     weights = VoxelWeights.of_counts(n_tower, n_voxels, protocol.loss.alpha, protocol.loss.epsilon)
-    identity = _identity(training, validation, settings, seed)
     history = _resume(checkpoint, identity, model, optimiser)
     label = f"{settings.name} seed {seed}: epochs"
     for epoch in track(range(len(history) + 1, protocol.epochs + 1), label):
@@ -153,6 +163,8 @@ def threshold_curve(
     model: VoxelModel, samples: Sequence[VoxelSample], measurement: Measurement
 ) -> ThresholdCurve:
     """Scores at every tau over all voxels of ``samples``, empty ones included."""
+    if isinstance(model, SceneNet) and model.field is not None:
+        return curve_of(model, scenes_of(model, samples, measurement))
     total = ThresholdCurve.empty()
     with torch.no_grad():
         kernel, bias = model.observer()
@@ -168,7 +180,7 @@ def probabilities(
     """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid."""
     occupancy, towers = batch([sample], measurement)
     with torch.no_grad():
-        probability = model(occupancy).numpy().reshape(-1)
+        probability = model.at(sample.grid.voxel_size)(occupancy).numpy().reshape(-1)
     truth = np.zeros(len(probability), bool)
     truth[towers] = True
     return probability, truth

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from scenenet.files import atomic, read_json, write_json
-from scenenet.metrics import ThresholdCurve
+from scenenet.metrics import Confusion, ThresholdCurve
 from scenenet.modelfile import ModelCard, read_model, write_model
 from scenenet.models import SceneNet, VoxelModel
 from scenenet.protocol import TuningSettings
+from scenenet.search import best_step
 from scenenet.split import crops_in
 from scenenet.training import threshold_curve
 from scenenet.voxel_store import load
@@ -48,13 +49,14 @@ def choose(
 ) -> tuple[VoxelModel, ModelCard, dict[str, Any]]:
     """The model at its best kernel size, its card with tau, and the result of ``tune``."""
     candidates: list[VoxelModel] = [model]
-    if isinstance(model, SceneNet):
+    field = model.field
+    if isinstance(model, SceneNet) and field is None:
         sizes = [size for size in settings.kernel_sizes if size != model.kernel_size]
         candidates += [model.with_kernel_size(size) for size in sizes]
     tried = []
     for candidate in candidates:
         curve = threshold_curve(candidate, validation, card.measurement)
-        tau, counts = curve.best()
+        tau, counts = curve.best() if field is None else _careful(curve, field.false_weight)
         tried.append((counts.f05, tau, candidate, curve, counts))
     # The size it was trained with comes first and wins a tie.
     _, tau, tuned, curve, counts = max(tried, key=lambda entry: entry[0])
@@ -69,6 +71,12 @@ def choose(
         ],
     }
     return tuned, card.with_tau(tau), result
+
+
+def _careful(curve: ThresholdCurve, false_weight: float) -> tuple[float, Confusion]:
+    """tau of a model in metres, and the counts there."""
+    step, _ = best_step(curve, false_weight)
+    return float(curve.tau[step]), curve.confusion(step)
 
 
 def curve_columns(curve: ThresholdCurve) -> dict[str, list[float]]:

@@ -297,6 +297,7 @@ def certify(
     Raises:
         InputError: there are no points, or they are too far apart for the voxel size.
     """
+    model = model.at(voxel_size)
     with torch.no_grad():
         kernel, bias = model.observer()
         k = kernel.detach().double().cpu()

@@ -20,6 +20,8 @@ class ShapeParameter:
         low, high: the range it is drawn from at the start of training, in units of ``unit``.
         unit: ``voxel``, ``voxel^2`` or ``1``.
         meaning: what it says about a tower, as part of a sentence.
+        metric: the range it stays within where kernels are in metres, in ``metric_unit``; low and
+            high, and never below a thousandth of high, if None.
     """
 
     name: str
@@ -27,11 +29,22 @@ class ShapeParameter:
     high: float
     unit: str
     meaning: str
+    metric: tuple[float, float] | None = None
+
+    @property
+    def metric_unit(self) -> str:
+        """``m``, ``m^2`` or ``1``: its unit where kernels are in metres."""
+        return self.unit.replace("voxel", "m")
+
+    @property
+    def metric_range(self) -> tuple[float, float]:
+        """Bounds above zero, in ``metric_unit``."""
+        return self.metric or (max(self.low, 1e-3 * self.high), self.high)
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """The places at which a kernel is sampled, in voxels.
+    """The places at which a kernel is sampled, in voxels or in metres.
 
     The kernel's centre lies on element ``(k - 1) // 2`` of each axis, the element that the
     convolution puts on the voxel it answers for (see ``scenenet.convolution``). An even size has
@@ -41,11 +54,13 @@ class Lattice:
         size: (kz, ky, kx).
         z: (kz, 1, 1) height above the centre.
         planar_squared: (1, ky, kx) squared distance from the vertical axis, ||pi_-3(x - c)||^2.
+        inside: (1, ky, kx) of 0 and 1, where the kernel is; None for all of it.
     """
 
     size: tuple[int, int, int]
     z: Tensor
     planar_squared: Tensor
+    inside: Tensor | None = None
 
     @classmethod
     def of_size(
@@ -60,6 +75,27 @@ class Lattice:
         z, y, x = (torch.arange(k, dtype=dtype, device=device) - (k - 1) // 2 for k in size)
         planar = y[:, None] ** 2 + x[None, :] ** 2
         return cls(size, z[:, None, None], planar[None])
+
+    @classmethod
+    def of_extent(
+        cls,
+        size: tuple[int, int, int],
+        radius: float,
+        voxel_size: float,
+        dtype: torch.dtype = torch.float32,
+        device: torch.device | None = None,
+    ) -> Lattice:
+        """The same in metres, within ``radius`` of the vertical axis; a disc has no corners that
+        would stand out when the scene is turned.
+
+        Args:
+            size: (kz, ky, kx), all odd.
+            radius, voxel_size: m.
+        """
+        voxels = cls.of_size(size, dtype, device)
+        planar = voxels.planar_squared * voxel_size**2
+        inside = (planar <= (radius * (1 + 1e-6)) ** 2).to(dtype)
+        return cls(size, voxels.z * voxel_size, planar, inside)
 
     @property
     def top(self) -> float:
@@ -91,7 +127,7 @@ class GeneoKernel(ABC):
         """
 
 
-def zero_sum(kernel: Tensor) -> Tensor:
+def zero_sum(kernel: Tensor, inside: Tensor | None = None) -> Tensor:
     """The kernel with its mean taken off each horizontal slice (thesis 4.4.1: "normalized").
 
     A kernel that sums to zero answers nothing to uniform surroundings and punishes points where
@@ -100,11 +136,15 @@ def zero_sum(kernel: Tensor) -> Tensor:
 
     Args:
         kernel: (kz, ky, kx).
+        inside: (1, ky, kx) of 0 and 1, ``Lattice.inside``: elsewhere the kernel is zero.
 
     Returns:
         (kz, ky, kx), each [z] summing to zero.
     """
-    return kernel - kernel.mean(dim=(1, 2), keepdim=True)
+    if inside is None:
+        return kernel - kernel.mean(dim=(1, 2), keepdim=True)
+    kernel = kernel * inside
+    return kernel - inside * (kernel.sum(dim=(1, 2), keepdim=True) / inside.sum())
 
 
 def gaussian_shell(squared_distance: Tensor, squared_radius: Tensor, sigma: Tensor) -> Tensor:

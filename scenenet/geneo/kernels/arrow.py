@@ -27,17 +27,20 @@ class Arrow(GeneoKernel):
 
     name = "arrow"
     parameters = (
-        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body"),
-        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around both radii"),
-        ShapeParameter("r_c", 0.5, 3.0, "voxel", "reach of the tower's head, where the lines meet"),
-        ShapeParameter("beta", 0.1, 0.9, "1", "inclination of the head"),
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 2.0)),
+        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around both radii", (0.15, 4.0)),
+        ShapeParameter(
+            "r_c", 0.5, 3.0, "voxel", "reach of the tower's head, where the lines meet", (0.3, 4.0)
+        ),
+        ShapeParameter("beta", 0.1, 0.9, "1", "inclination of the head", (0.05, 0.95)),
     )
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
         head_slices = max(1, round(CONE_SHARE * lattice.size[0]))
-        above_h = lattice.z - (lattice.top - head_slices + 1)
+        above_h = lattice.z - lattice.z[lattice.size[0] - head_slices]
         theta = shape["beta"] * math.pi / (2 + above_h.clamp(min=0))
         radius_squared = torch.where(
             above_h < 0, shape["r"] ** 2, shape["r_c"] ** 2 * torch.sin(theta)
         )
-        return zero_sum(gaussian_shell(lattice.planar_squared, radius_squared, shape["sigma"]))
+        shell = gaussian_shell(lattice.planar_squared, radius_squared, shape["sigma"])
+        return zero_sum(shell, lattice.inside)

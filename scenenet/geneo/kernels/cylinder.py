@@ -16,10 +16,10 @@ class Cylinder(GeneoKernel):
 
     name = "cylinder"
     parameters = (
-        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body"),
-        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius"),
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 2.0)),
+        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius", (0.15, 4.0)),
     )
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
         shell = gaussian_shell(lattice.planar_squared, shape["r"] ** 2, shape["sigma"])
-        return zero_sum(shell.expand(lattice.size))
+        return zero_sum(shell.expand(lattice.size), lattice.inside)

@@ -1,0 +1,120 @@
+"""Training of protocol ``field``: the numbers of a SCENE-Net in metres are searched for."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from scenenet.files import atomic
+from scenenet.models import SceneNet, new_model
+from scenenet.progress import track
+from scenenet.protocol import ModelSettings
+from scenenet.search import (
+    Scene,
+    State,
+    advance,
+    begin,
+    best_step,
+    curve_of,
+    draws,
+    scenes_of,
+    scorer,
+    settled,
+)
+from scenenet.voxels import VoxelSample
+
+
+def fit_field(
+    training: Sequence[VoxelSample],
+    validation: Sequence[VoxelSample],
+    settings: ModelSettings,
+    seed: int,
+    identity: str,
+    *,
+    checkpoint: Path | None = None,
+) -> tuple[SceneNet, pd.DataFrame]:
+    """Search for the numbers of a new SCENE-Net in metres; as ``scenenet.training.fit``.
+
+    A row of the history is a generation of the search: loss is 1 - F0.5 on the training crops, as
+    the search weighs it, of the best numbers so far, whose parameters follow.
+
+    Args:
+        identity: of all that a checkpoint depends on.
+    """
+    model = new_model(settings, seed)
+    assert isinstance(model, SceneNet)
+    learnt = scenes_of(model, training, settings.measurement)
+    kept = scenes_of(model, validation, settings.measurement)
+    score = scorer(model, learnt)
+    state, history = _resume(checkpoint, identity)
+    if state is None:
+        starts = draws(model, settings.search.starts, np.random.default_rng([seed, 0]))
+        state = begin(starts, score, settings.search.step)
+    label = f"{settings.name} seed {seed}: generations"
+    last = settings.search.generations
+    for generation in track(range(state.generation + 1, last + 1), label):
+        started = time.perf_counter()
+        # The draws follow from seed and generation alone: a resumed search draws the same.
+        rng = np.random.default_rng([seed, generation])
+        state = advance(state, score, settings.search.population, rng)
+        if generation == last:
+            state = settled(state, score)
+        model.set_numbers(state.best)
+        history.append(_row(model, state, kept, settings, time.perf_counter() - started))
+        if checkpoint is not None:
+            _save(checkpoint, identity, state, history)
+    model.set_numbers(state.best)
+    return model, pd.DataFrame(history)
+
+
+def _row(
+    model: SceneNet, state: State, kept: Sequence[Scene], settings: ModelSettings, seconds: float
+) -> dict[str, float]:
+    loss = 1 - state.best_score
+    row = {"epoch": state.generation, "loss": loss, "fidelity": loss, "penalty": 0.0}
+    row["seconds"] = seconds
+    row |= {"validation_loss": float("nan"), "validation_f05": float("nan")}
+    if kept:
+        curve = curve_of(model, kept)
+        row["validation_loss"] = 1 - best_step(curve, settings.field.false_weight)[1]
+        row["validation_f05"] = curve.best()[1].f05
+    return row | model.shape_parameters()
+
+
+def _save(path: Path, identity: str, state: State, history: list[dict[str, float]]) -> None:
+    from safetensors.numpy import save_file
+
+    fields = asdict(state)
+    arrays = {k: np.ascontiguousarray(v) for k, v in fields.items() if isinstance(v, np.ndarray)}
+    plain = {k: v for k, v in fields.items() if k not in arrays}
+    metadata = {
+        "identity": identity,
+        "state": json.dumps(plain),
+        "history": json.dumps(history),
+    }
+    with atomic(path) as partial:
+        save_file(arrays, partial, metadata=metadata)
+
+
+def _resume(path: Path | None, identity: str) -> tuple[State | None, list[dict[str, Any]]]:
+    """State and history of a checkpoint; none where none fits."""
+    if path is None or not path.is_file():
+        return None, []
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="np") as stream:
+            metadata = stream.metadata() or {}
+            if metadata.get("identity") != identity or "state" not in metadata:
+                return None, []
+            arrays = {name: stream.get_tensor(name) for name in list(stream.keys())}
+    except SafetensorError:  # damaged: the search begins anew, which costs time and no result
+        return None, []
+    return State(**arrays, **json.loads(metadata["state"])), json.loads(metadata["history"])

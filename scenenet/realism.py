@@ -63,7 +63,7 @@ def real_crops(folder: str | Path) -> Iterator[PointCloud]:
     samples = sample_files(folder)
     if not samples:
         raise InputError(
-            "there are no TS40K samples", file=folder, remedy="Name a folder of .npy or .pt samples"
+            "this is no TS40K sample", file=folder, remedy="Name a folder of .npy or .pt samples"
         )
     for sample in samples:
         yield read(sample, "edp")

@@ -60,9 +60,11 @@ def test_the_table_says_what_is_in_range(measured):
     assert "**no**" in text
 
 
-def test_a_folder_without_samples_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no TS40K samples"):
+def test_what_holds_no_samples_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no TS40K sample"):
         next(real_crops(tmp_path))
+    with pytest.raises(InputError, match="no TS40K sample"):
+        next(real_crops(tmp_path / "survey.laz"))
 
 
 @pytest.mark.parametrize("module", ["realism", "transfer"])

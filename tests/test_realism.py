@@ -78,7 +78,7 @@ def test_the_command_says_what_it_does(module):
 
 def test_default_corridors_are_like_the_public_crops(real_data):
     real = measure(real_crops(real_data / "ts40k"))
-    synthetic = measure(synthetic_crops(SyntheticSettings(towers=30, seed=5)))
+    synthetic = measure(synthetic_crops(SyntheticSettings(towers=24, seed=5)))
     table = beside(real.properties, synthetic.properties)
     outside = table.loc[~table["within"], "property"].tolist()
     assert len(outside) <= 4, outside

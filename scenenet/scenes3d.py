@@ -38,10 +38,10 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
     from scenenet.batches import batch
     from scenenet.convolution import convolve_at_voxels
     from scenenet.figures.drawings import champion_of, class_groups, crop_cloud, ranked
-    from scenenet.metrics import THRESHOLDS
+    from scenenet.metrics import THRESHOLDS, ThresholdCurve
     from scenenet.modelfile import read_model
     from scenenet.models import SceneNet
-    from scenenet.observer import count_reached
+    from scenenet.training import probabilities
     from scenenet.voxels import VoxelSettings, voxelise
 
     champion = champion_of(results, model)
@@ -50,17 +50,19 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
     trained, card = read_model(champion.model_files[0])
     settings = VoxelSettings(fit=card.fit, resolution=card.resolution, voxel_size=card.voxel_size)
     voxels = voxelise(cloud, settings.grid(cloud.xyz), sample["id"])
-    occupancy, towers = batch([voxels], card.measurement)
-    with torch.no_grad():
-        kernel, bias = trained.observer()
-        true, false = count_reached(occupancy, kernel, bias, towers, THRESHOLDS)
-        probability = trained(occupancy).numpy().reshape(-1)[voxels.index]
-        shares = {}
-        if isinstance(trained, SceneNet):
-            parts = convolve_at_voxels(occupancy, trained.weighted_kernels()).numpy()
-            whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
-            percent = np.rint(100 * parts / whole).astype("<i1")
-            shares = {name: _coded(row) for name, row in zip(trained.names, percent, strict=True)}
+    trained = trained.at(voxels.grid.voxel_size)
+    everywhere, truth = probabilities(trained, voxels, card.measurement)
+    curve = ThresholdCurve.of(everywhere, truth)
+    probability = everywhere[voxels.index]
+    shares = {}
+    if isinstance(trained, SceneNet):
+        occupancy, _ = batch([voxels], card.measurement)
+        with torch.no_grad():
+            answers = convolve_at_voxels(occupancy, trained.weighted_kernels())
+            parts = answers[:, trained.speakers(occupancy, answers.sum(dim=0))].numpy()
+        whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
+        percent = np.rint(100 * parts / whole).astype("<i1")
+        shares = {name: _coded(row) for name, row in zip(trained.names, percent, strict=True)}
     taus = THRESHOLDS.astype(probability.dtype)
     zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
     classes = _classes(class_groups(cloud), voxels.grid.voxel_of(cloud.xyz), voxels.index)
@@ -77,8 +79,8 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
         "tower": _coded(voxels.tower.astype("<u1")),
         "shares": shares,
         "taus": [float(f"{tau:.6g}") for tau in THRESHOLDS],
-        "true": true.tolist(),
-        "false": false.tolist(),
+        "true": curve.true.tolist(),
+        "false": curve.false.tolist(),
         "tau_step": int(np.argmin(np.abs(THRESHOLDS - card.threshold()))),
     }
     write_json(out, scene)

@@ -321,7 +321,7 @@ def _probability(cloud: PointCloud, champion: SeedResult) -> View:
     grid = settings.grid(cloud.xyz)
     occupancy, _ = batch([voxelise(cloud, grid)], card.measurement)
     with torch.no_grad():
-        volume = model(occupancy)[0].numpy().reshape(-1)
+        volume = model.at(grid.voxel_size)(occupancy)[0].numpy().reshape(-1)
     return View(champion.model, volume[grid.voxel_of(cloud.xyz)], "probability")
 
 

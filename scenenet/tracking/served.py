@@ -19,7 +19,8 @@ class TowerModel(PythonModel):
     def load_context(self, context: Any) -> None:
         from scenenet.modelfile import read_model
 
-        self.model, self.card = read_model(context.artifacts["model"])
+        model, card = read_model(context.artifacts["model"])
+        self.model = model.at(card.voxel_size)
 
     def predict(
         self, context: Any, model_input: np.ndarray, params: dict[str, Any] | None = None
@@ -28,7 +29,7 @@ class TowerModel(PythonModel):
 
         Args:
             model_input: (B, D, H, W) measurement phi of each voxel, 0 where it is empty; axes
-                z (up), y, x. Presence or density, as the model was trained.
+                z (up), y, x. Presence or density, in voxels of the size the model was trained at.
 
         Returns:
             (B, D, H, W) float32 in [0, 1]; the tower voxels are those of at least the model's tau.

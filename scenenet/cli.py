@@ -44,6 +44,13 @@ class Fit(StrEnum):
     metric = "metric"
 
 
+class TrainedBy(StrEnum):
+    """Protocols; see ``scenenet.protocol``."""
+
+    field = "field"
+    thesis = "thesis"
+
+
 class Kind(StrEnum):
     """Architectures; see ``scenenet.models``."""
 
@@ -121,15 +128,32 @@ def train(
         Path, typer.Option("--out", help="Model file to write (.json; .safetensors for a cnn).")
     ],
     kind: Annotated[Kind, typer.Option(help="Architecture.")] = Kind.scenenet,
+    protocol: Annotated[
+        TrainedBy,
+        typer.Option(
+            help="field: a SCENE-Net in metres, searched for, and a CNN that begins at the data; "
+            "thesis: by gradient from a random start."
+        ),
+    ] = TrainedBy.field,
     seeds: Annotated[int, typer.Option(min=1, help="Models to train; the best is kept.")] = 5,
-    epochs: Annotated[int, typer.Option(min=1, help="Passes over the crops.")] = 150,
-    learning_rate: Annotated[float, typer.Option(min=1e-6, help="Step size of RMSProp.")] = 0.01,
+    epochs: Annotated[
+        int, typer.Option(min=1, help="Passes over the crops, where training is by gradient.")
+    ] = 150,
+    learning_rate: Annotated[
+        float, typer.Option(min=1e-6, help="Step size of RMSProp, where training is by gradient.")
+    ] = 0.01,
     resolution: Annotated[
         int, typer.Option(help="Voxels an edge of a crop: 32, 64, 128, 256.")
     ] = 64,
     validation: Annotated[
-        float, typer.Option(min=0, max=0.9, help="Share of the crops that tau is tuned on.")
-    ] = 0.3,
+        float | None,
+        typer.Option(
+            min=0,
+            max=0.9,
+            help="Share of the crops kept to tune on; 0.3 if not given, and none for a SCENE-Net "
+            "of protocol field, whose eleven numbers hardly know their crops by heart.",
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Train a model on labelled crops or surveys."""
@@ -141,8 +165,13 @@ def train(
     ending = ".json" if kind is Kind.scenenet else ".safetensors"
     if out.suffix != ending:
         raise typer.BadParameter(f"a {kind} is kept in a {ending} file", param_hint="--out")
-    training = TrainingSettings(epochs=epochs, learning_rate=learning_rate)
-    settings = ModelSettings(name=kind.value, kind=kind.value, training=training)
+    in_metres = kind is Kind.scenenet and protocol is TrainedBy.field
+    if validation is None:
+        validation = 0.0 if in_metres else 0.3
+    training = TrainingSettings(init=protocol.value, epochs=epochs, learning_rate=learning_rate)
+    settings = ModelSettings(
+        name=kind.value, kind=kind.value, protocol=protocol.value, training=training
+    )
     result = train_files(
         labelled,
         codes.value,

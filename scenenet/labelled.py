@@ -129,7 +129,7 @@ def train_files(
     for seed in seeds:
         model, _ = fit(learnt, kept, settings, seed)
         card = card_of(training, settings, grid, seed, provenance)
-        tuned, card, result = choose(model, card, kept or learnt, tuning)
+        tuned, card, result = choose(model, card, kept or learnt, tuning, learnt if kept else ())
         tried.append((seed, tuned, card, result))
     seed, tuned, card, result = max(tried, key=lambda entry: entry[3]["validation"]["f05"])
     write_model(out, tuned, card)

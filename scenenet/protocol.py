@@ -47,10 +47,10 @@ class SearchSettings(Settings):
     """How the eleven numbers of a SCENE-Net in metres are found."""
 
     starts: int = Field(
-        256, ge=1, description="numbers drawn at first; the search begins at the best of them"
+        128, ge=1, description="numbers drawn at first; the search begins at the best of them"
     )
-    population: int = Field(16, ge=4, description="numbers tried in a generation")
-    generations: int = Field(100, ge=1, description="steps of the search")
+    population: int = Field(14, ge=4, description="numbers tried in a generation")
+    generations: int = Field(60, ge=1, description="steps of the search")
     step: float = Field(0.7, gt=0, description="first step size, in units of the logit")
 
 

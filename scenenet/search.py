@@ -16,6 +16,7 @@ import numpy as np
 import torch
 
 from scenenet.batches import batch
+from scenenet.coarse import block_edge, coarsened
 from scenenet.convolution import Occupancy, convolve_at_voxels
 from scenenet.metrics import BETA, THRESHOLDS, ThresholdCurve
 from scenenet.models import SceneNet
@@ -44,12 +45,23 @@ STEPS = _coarse_steps()
 
 @dataclass(frozen=True)
 class Scene:
-    """A crop, ready to be answered many times: its voxels and the sections they are in."""
+    """A crop, ready to be answered many times.
 
-    occupancy: Occupancy
-    tower: np.ndarray
+    Attributes:
+        observed: its voxels, or the blocks of them that a fine grid is observed through.
+        voxel_size: m, edge of these.
+        section: the others in the section of each (``scenenet.sections``).
+        row: (M,) the one that each occupied voxel of the crop lies in.
+        tower: (M,) bool, the truth.
+        n_voxels: all voxels of the crop, empty ones included.
+    """
+
+    observed: Occupancy
     voxel_size: float
     section: tuple[np.ndarray, np.ndarray]
+    row: np.ndarray
+    tower: np.ndarray
+    n_voxels: int
 
 
 def scenes_of(
@@ -59,17 +71,20 @@ def scenes_of(
     scenes = []
     for sample in samples:
         occupancy, _ = batch([sample], measurement)
-        size = sample.grid.voxel_size
-        section = model.at(size).section(occupancy)
-        scenes.append(Scene(occupancy, sample.tower, size, section))
+        edge = block_edge(sample.grid.voxel_size)
+        observed, row = coarsened(occupancy, edge)
+        size = edge * sample.grid.voxel_size
+        section = model.at(size).section(observed)
+        scenes.append(Scene(observed, size, section, row, sample.tower, sample.grid.n_voxels))
     return scenes
 
 
 def answers(model: SceneNet, scene: Scene) -> np.ndarray:
     """Probability of each occupied voxel, (M,) float32; that of the others is 0."""
     kernel, _ = model.at(scene.voxel_size).observer()
-    observed = convolve_at_voxels(scene.occupancy, kernel.detach()[None])[0].numpy()
-    return np.tanh(np.maximum(observed[strongest(observed, *scene.section)], 0))
+    observed = convolve_at_voxels(scene.observed, kernel.detach()[None])[0].numpy()
+    spoken = observed[strongest(observed, *scene.section)]
+    return np.tanh(np.maximum(spoken, 0))[scene.row]
 
 
 def curve_of(model: SceneNet, scenes: Sequence[Scene]) -> ThresholdCurve:
@@ -78,7 +93,7 @@ def curve_of(model: SceneNet, scenes: Sequence[Scene]) -> ThresholdCurve:
     with torch.no_grad():
         for scene in scenes:
             curve = ThresholdCurve.of(answers(model, scene), scene.tower)
-            curve.false[0] += scene.occupancy.n_voxels - len(scene.tower)
+            curve.false[0] += scene.n_voxels - len(scene.tower)
             total += curve
     return total
 

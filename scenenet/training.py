@@ -24,7 +24,7 @@ from scenenet.models import SceneNet, VoxelModel, new_model
 from scenenet.observer import count_reached
 from scenenet.progress import track
 from scenenet.protocol import Measurement, ModelSettings, TrainingSettings
-from scenenet.search import curve_of, scenes_of
+from scenenet.search import answers, curve_of, scenes_of
 from scenenet.split import crops_in
 from scenenet.voxel_store import Dataset, load
 from scenenet.voxels import VoxelSample, VoxelSettings
@@ -178,11 +178,24 @@ def probabilities(
     model: VoxelModel, sample: VoxelSample, measurement: Measurement
 ) -> tuple[np.ndarray, np.ndarray]:
     """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid."""
+    if isinstance(model, SceneNet) and model.field is not None:
+        (scene,) = scenes_of(model, [sample], measurement)
+        with torch.no_grad():
+            return _spread(sample, answers(model, scene))
     occupancy, towers = batch([sample], measurement)
     with torch.no_grad():
-        probability = model.at(sample.grid.voxel_size)(occupancy).numpy().reshape(-1)
+        probability = model(occupancy).numpy().reshape(-1)
     truth = np.zeros(len(probability), bool)
     truth[towers] = True
+    return probability, truth
+
+
+def _spread(sample: VoxelSample, occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Probability and truth of every voxel from the probability (M,) of the occupied ones."""
+    probability = np.zeros(sample.grid.n_voxels, np.float32)
+    probability[sample.index] = occupied
+    truth = np.zeros(sample.grid.n_voxels, bool)
+    truth[sample.tower_index()] = True
     return probability, truth
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scenenet.files import atomic, read_json, write_json
-from scenenet.metrics import Confusion, ThresholdCurve
+from scenenet.metrics import ThresholdCurve
 from scenenet.modelfile import ModelCard, read_model, write_model
 from scenenet.models import SceneNet, VoxelModel
 from scenenet.protocol import TuningSettings
@@ -35,7 +35,10 @@ def tune(
     """
     trained, card = read_model(model)
     samples = load(voxel_manifests, crops_in(split, "validation")).samples
-    tuned, card, result = choose(trained, card, samples, settings)
+    learnt: Sequence[VoxelSample] = ()
+    if trained.field is not None:
+        learnt = load(voxel_manifests, crops_in(split, "train")).samples
+    tuned, card, result = choose(trained, card, samples, settings, learnt)
     write_model(out_model, tuned, card)
     write_json(out_json, result)
     return result
@@ -46,8 +49,15 @@ def choose(
     card: ModelCard,
     validation: Sequence[VoxelSample],
     settings: TuningSettings,
+    learnt: Sequence[VoxelSample] = (),
 ) -> tuple[VoxelModel, ModelCard, dict[str, Any]]:
-    """The model at its best kernel size, its card with tau, and the result of ``tune``."""
+    """The model at its best kernel size, its card with tau, and the result of ``tune``.
+
+    Args:
+        learnt: crops it was trained on. tau of a SCENE-Net in metres is chosen on these as well:
+            eleven numbers hardly know them by heart, and a single validation crop is too little to
+            choose by. The scores are those of the validation part all the same.
+    """
     candidates: list[VoxelModel] = [model]
     field = model.field
     if isinstance(model, SceneNet) and field is None:
@@ -56,7 +66,12 @@ def choose(
     tried = []
     for candidate in candidates:
         curve = threshold_curve(candidate, validation, card.measurement)
-        tau, counts = curve.best() if field is None else _careful(curve, field.false_weight)
+        if field is None:
+            tau, counts = curve.best()
+        else:
+            both = curve + threshold_curve(candidate, learnt, card.measurement)
+            step, _ = best_step(both, field.false_weight)
+            tau, counts = float(curve.tau[step]), curve.confusion(step)
         tried.append((counts.f05, tau, candidate, curve, counts))
     # The size it was trained with comes first and wins a tie.
     _, tau, tuned, curve, counts = max(tried, key=lambda entry: entry[0])
@@ -71,12 +86,6 @@ def choose(
         ],
     }
     return tuned, card.with_tau(tau), result
-
-
-def _careful(curve: ThresholdCurve, false_weight: float) -> tuple[float, Confusion]:
-    """tau of a model in metres, and the counts there."""
-    step, _ = best_step(curve, false_weight)
-    return float(curve.tau[step]), curve.confusion(step)
 
 
 def curve_columns(curve: ThresholdCurve) -> dict[str, list[float]]:

@@ -1,33 +1,65 @@
-"""From voxels that look like a tower to towers (thesis 5.1.2, last paragraph)."""
+"""From voxels that look like a tower to towers (thesis 5.1.2, last paragraph; docs/towers.md).
+
+The model says where to look: an axis is put where detected voxels stand above one another. What
+stands there is then measured in the occupied voxels, detected or not, so that a tower does not
+depend on how much of it a model finds.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydantic import Field
 
+from scenenet.bodies import middle, standing
 from scenenet.settings import Settings
+from scenenet.wires import FAR, SCALES, Span, leaving_spans
 
 
 class DetectionSettings(Settings):
     """What makes a tower of detected voxels."""
 
     eps: float = Field(
-        6.0, gt=0, description="m, planar; detected voxels nearer than this are one tower"
+        6.0,
+        gt=0,
+        description="m, planar; detected voxels nearer than this to an axis belong to it",
     )
-    min_voxels: int = Field(5, ge=1, description="detected voxels that a tower must have")
+    min_voxels: int = Field(
+        3, ge=1, description="detected voxels that must stand above one another on an axis"
+    )
+    min_body: float = Field(
+        3.0,
+        ge=0,
+        description="m from the lowest to the highest of them, a third of the lowest tower: a "
+        "tower is detected along its body, a treetop or a roof at one place",
+    )
     min_height: float = Field(
         9.0, ge=0, description="m; thesis 5.1.2 has towers from 18 m, wooden poles begin at 9 m"
     )
-    min_body: float = Field(
-        6.0,
-        ge=0,
-        description="m from the lowest to the highest detected voxel: a tower is detected along "
-        "its body, a treetop or a roof at one place",
-    )
     foot_radius: float = Field(
         5.0, gt=0, description="m, around the tower, where the ground at its foot is looked for"
+    )
+    min_upright: float = Field(
+        0.75,
+        ge=0,
+        le=1,
+        description="share of the levels from foot to top at which something must stand: a tower "
+        "goes all the way down, wires above one another do not",
+    )
+    crossarm: float = Field(
+        0.25,
+        gt=0,
+        le=1,
+        description="of the height; conductors hang at most this far beside the axis",
+    )
+    min_wire: float = Field(
+        0.75,
+        ge=0,
+        description="of the way from 3 to 20 m off the axis, or to the edge of the data, that "
+        "wires must be followed from the head, all directions together; 0 to ask for none. Trees, "
+        "cranes, lone poles and roofs have none",
     )
 
 
@@ -36,9 +68,12 @@ class DetectedTower:
     """A tower found in a prediction.
 
     Attributes:
-        x, y: m, mean of its detected voxels, each weighted by its probability.
+        x, y: m, middle of its body.
         base: m, elevation of the ground at its foot.
-        height: m, from there to the top of its highest detected voxel.
+        height: m, from there to its top.
+        width: m, of its body where it stands free.
+        upright: share of the levels from foot to top at which something stands.
+        spans: directions in which wires leave, the longest first.
         probability: highest probability among its voxels.
         voxels: positions of its voxels in what was passed to ``detect_towers``.
     """
@@ -47,51 +82,189 @@ class DetectedTower:
     y: float
     base: float
     height: float
+    width: float
+    upright: float
+    spans: tuple[Span, ...]
     probability: float
     voxels: np.ndarray
+
+
+Surroundings = Callable[[np.ndarray, float], np.ndarray]
+"""(2,) m and a radius in m to the (M, 3) m middles of the occupied voxels that near in plan."""
+
+LOOK_M = FAR + max(SCALES)
+"""How far around an axis the occupied voxels are asked for."""
+
+MEANS = 5
+"""Means over the voxels about an axis, each about the one before, that put it in their midst; the
+last ones hardly move it."""
+
+APART = 0.5
+"""Of its height: how far from a tower the next one stands at least."""
 
 
 def detect_towers(
     centres: np.ndarray,
     probability: np.ndarray,
-    surroundings: np.ndarray,
+    surroundings: Surroundings,
     voxel_size: float,
     settings: DetectionSettings,
 ) -> list[DetectedTower]:
-    """Group detected voxels into towers, highest probability first.
+    """Find the towers among detected voxels, highest probability first.
 
     Args:
         centres: (V, 3) m, middles of the voxels with probability >= tau.
         probability: (V,).
-        surroundings: (M, 3) m, middles of occupied voxels, at least all within ``foot_radius`` of
-            a detected one.
+        surroundings: tells the occupied voxels around a place.
         voxel_size: m.
     """
     if len(centres) == 0:
         return []
-    from scipy.spatial import cKDTree
-    from sklearn.cluster import DBSCAN
-
     offset = centres.min(axis=0)
-    # In plan: what stands above one another is one tower, however little lies between. One place a
-    # column, because DBSCAN's memory grows with the pairs of places that are near each other.
-    columns, column_of = np.unique((centres - offset)[:, :2], axis=0, return_inverse=True)
-    labels = DBSCAN(eps=settings.eps, min_samples=1).fit_predict(columns)[column_of.reshape(-1)]
-    ground = cKDTree(surroundings[:, :2] - offset[:2])
-    towers = []
-    for label in range(labels.max() + 1):
-        voxels = np.flatnonzero(labels == label)
-        body = float(np.ptp(centres[voxels, 2])) + voxel_size
-        if len(voxels) < settings.min_voxels or body < settings.min_body:
-            continue
-        x, y = np.average(centres[voxels, :2], axis=0, weights=probability[voxels])
-        near = ground.query_ball_point([x - offset[0], y - offset[1]], settings.foot_radius)
-        elevations = np.append(surroundings[near, 2], centres[voxels, 2].min())
-        # Not the lowest: a return from below the ground must not make a tower of a bush.
-        base = float(np.percentile(elevations, 5)) - voxel_size / 2
-        height = float(centres[voxels, 2].max()) + voxel_size / 2 - base
-        if height < settings.min_height:
-            continue
-        peak = float(probability[voxels].max())
-        towers.append(DetectedTower(float(x), float(y), base, height, peak, voxels))
+    detected = _Detected(centres - offset, probability, voxel_size)
+    found = []
+    for axis in _neighbours_together(_axes(detected, settings)):
+        around = surroundings(axis + offset[:2], LOOK_M) - offset
+        tower = _measure(detected, axis, around, settings)
+        if tower is not None:
+            found.append(tower)
+    x, y, z = (float(metres) for metres in offset)
+    towers = [
+        replace(tower, x=tower.x + x, y=tower.y + y, base=tower.base + z)
+        for tower in _one_of_each(found, detected, settings)
+    ]
     return sorted(towers, key=lambda t: (-t.probability, t.x, t.y))
+
+
+def among(places: np.ndarray) -> Surroundings:
+    """The surroundings where all occupied voxels (M, 3) m are at hand."""
+
+    def near(place: np.ndarray, radius: float) -> np.ndarray:
+        return places[np.hypot(places[:, 0] - place[0], places[:, 1] - place[1]) <= radius]
+
+    return near
+
+
+class _Detected:
+    """Detected voxels (V, 3) m, to be found by their place in plan."""
+
+    def __init__(self, centres: np.ndarray, probability: np.ndarray, voxel_size: float) -> None:
+        from scipy.spatial import cKDTree
+
+        self.centres, self.probability, self.voxel_size = centres, probability, voxel_size
+        self.columns, column_of = np.unique(centres[:, :2], axis=0, return_inverse=True)
+        column_of = column_of.reshape(-1)
+        order = np.argsort(column_of, kind="stable")
+        self._members = np.split(order, np.cumsum(np.bincount(column_of))[:-1])
+        self._tree = cKDTree(self.columns)
+
+    def columns_within(self, place: np.ndarray, radius: float) -> list[int]:
+        """Columns within a planar radius in m of a place (2,) m."""
+        return self._tree.query_ball_point(place, radius)
+
+    def within(self, place: np.ndarray, radius: float) -> np.ndarray:
+        """Voxels within a planar radius in m of a place (2,) m."""
+        columns = sorted(self.columns_within(place, radius))
+        return np.concatenate([self._members[c] for c in columns] or [np.empty(0, np.int64)])
+
+    def mean(self, voxels: np.ndarray) -> np.ndarray:
+        """(2,) m, mean place of voxels, each weighted by its probability."""
+        return np.average(self.centres[voxels, :2], axis=0, weights=self.probability[voxels])
+
+    def tallest_first(self) -> np.ndarray:
+        """Columns, those with most detected levels in them or in a column beside them first."""
+        level = np.rint(self.centres[:, 2] / self.voxel_size).astype(int)
+        touching = self._tree.query_ball_point(self.columns, 1.5 * self.voxel_size)
+        levels, certain = np.empty(len(self.columns)), np.empty(len(self.columns))
+        for column, beside in enumerate(touching):
+            near = np.concatenate([self._members[c] for c in sorted(beside)])
+            levels[column] = len(set(level[near].tolist()))
+            certain[column] = self.probability[near].sum()
+        return np.lexsort((self.columns[:, 1], self.columns[:, 0], -certain, -levels))
+
+
+def _axes(detected: _Detected, settings: DetectionSettings) -> Iterator[np.ndarray]:
+    """Places (2,) m where detected voxels stand above one another.
+
+    The next axis begins at least ``eps`` from those before it, at which more stand above one
+    another.
+    """
+    taken = np.zeros(len(detected.columns), bool)
+    for column in detected.tallest_first():
+        if taken[column]:
+            continue
+        axis = detected.columns[column]
+        for _ in range(MEANS):
+            body = detected.within(axis, settings.eps / 2)
+            axis = detected.mean(body)
+        taken[detected.columns_within(axis, settings.eps)] = True
+        taken[column] = True
+        extent = np.ptp(detected.centres[body, 2]) + detected.voxel_size
+        if len(body) >= settings.min_voxels and extent >= settings.min_body:
+            yield axis
+
+
+def _neighbours_together(axes: Iterable[np.ndarray]) -> list[np.ndarray]:
+    """Axes in an order in which those near one another need the same surroundings."""
+    return sorted(axes, key=lambda axis: (*(axis // LOOK_M), *axis))
+
+
+def _measure(
+    detected: _Detected, axis: np.ndarray, around: np.ndarray, settings: DetectionSettings
+) -> DetectedTower | None:
+    """The tower on an axis (2,) m, or None where what stands there is none.
+
+    Args:
+        around: (M, 3) m, middles of the occupied voxels within ``LOOK_M``.
+    """
+    size, foot_radius = detected.voxel_size, settings.foot_radius
+    seen = detected.within(axis, settings.eps / 2)
+    body = standing(around, axis, detected.centres[seen, 2], foot_radius, size)
+    if body.height < settings.min_height:
+        return None
+    # Now that its height is known, it is known how far it reaches.
+    crossarm = max(settings.eps / 2, settings.crossarm * body.height)
+    for _ in range(MEANS):
+        seen = detected.within(axis, crossarm)
+        axis = detected.mean(seen)
+    axis, width = middle(around, axis, body, size)
+    if not np.isfinite(width):
+        return None
+    body = standing(around, axis, detected.centres[seen, 2], foot_radius, size)
+    if body.height < settings.min_height or body.upright < settings.min_upright:
+        return None
+    x, y = float(axis[0]), float(axis[1])
+    crossarm = max(settings.eps / 2, settings.crossarm * body.height)
+    spans = leaving_spans(around, (x, y), body.base, body.height, crossarm, size)
+    if sum(span.followed for span in spans) < settings.min_wire:
+        return None
+    peak = float(detected.probability[seen].max())
+    return DetectedTower(
+        x, y, body.base, body.height, width, body.upright, tuple(spans), peak, seen
+    )
+
+
+def _one_of_each(
+    found: list[DetectedTower], detected: _Detected, settings: DetectionSettings
+) -> list[DetectedTower]:
+    """Towers with the voxels that are theirs.
+
+    One tower may have several axes, at its legs or on a crossarm. That on which most stands is its
+    own.
+    """
+    towers: list[DetectedTower] = []
+    taken = np.zeros(len(detected.centres), bool)
+    for tower in sorted(found, key=lambda t: (-t.upright * t.height, -t.probability, t.x, t.y)):
+        if any(
+            np.hypot(tower.x - t.x, tower.y - t.y) <= max(settings.eps, APART * t.height)
+            for t in towers
+        ):
+            continue
+        reach = max(settings.eps, settings.crossarm * tower.height)
+        near = np.union1d(detected.within(np.array([tower.x, tower.y]), reach), tower.voxels)
+        mine = near[~taken[near]]
+        if len(mine) == 0:  # all that was seen of it is another's
+            continue
+        taken[mine] = True
+        towers.append(replace(tower, voxels=mine))
+    return towers

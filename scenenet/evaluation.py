@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scenenet.crops import Crop
-from scenenet.detection import DetectionSettings, detect_towers
+from scenenet.detection import DetectionSettings, among, detect_towers
 from scenenet.metrics import Confusion, ThresholdCurve, TowerMatch, confusion, match_towers
 from scenenet.modelfile import ModelCard, read_model
 from scenenet.models import VoxelModel
@@ -126,7 +126,7 @@ def crop_towers(
     found = detect_towers(
         sample.grid.centres(detected),
         probability[detected],
-        sample.grid.centres(sample.index),
+        among(sample.grid.centres(sample.index)),
         sample.grid.voxel_size,
         detection,
     )

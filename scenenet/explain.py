@@ -10,6 +10,7 @@ from typing import Any
 from scenenet.geneo import kernel_named
 from scenenet.modelfile import ModelCard
 from scenenet.models import SceneNet, VoxelModel
+from scenenet.wires import FAR
 
 SILENT = 0.01
 """A GENEO with a smaller share said nothing that a person would want to read."""
@@ -24,6 +25,7 @@ class Receipt:
         x, y: m, in the survey's CRS.
         height: m above the ground at its foot.
         probability: of its most certain voxel.
+        evidence: what was measured there that speaks for a tower, whatever the model says.
         contributions: (GENEO, share, sentence), the largest first. Positive shares speak for a
             tower, negative ones against; their absolute values sum to about one.
         doubts: what should make a person look again.
@@ -34,6 +36,7 @@ class Receipt:
     y: float
     height: float
     probability: float
+    evidence: tuple[str, ...]
     contributions: tuple[tuple[str, float, str], ...]
     doubts: tuple[str, ...]
 
@@ -55,6 +58,8 @@ def _receipt(feature: Mapping[str, Any], model: VoxelModel, card: ModelCard) -> 
             f"{facts['edge_distance']:.0f} m from the edge of the data, nearer than it is tall: "
             "it may be cut off"
         )
+    if facts["wire_directions"] == 1 and facts["edge_distance"] >= FAR:
+        doubts.append("wires leave it in one direction only: the end of a line, or no tower")
     if card.tau is not None and facts["probability"] < (1 + card.tau) / 2:
         doubts.append(f"its probability is not far above tau, {card.tau:.3f}")
     x, y = feature["geometry"]["coordinates"][:2]
@@ -64,8 +69,23 @@ def _receipt(feature: Mapping[str, Any], model: VoxelModel, card: ModelCard) -> 
         y,
         facts["height"],
         facts["probability"],
+        _evidence(facts),
         tuple((name, share, _sentence(name, share, model)) for name, share in shares),
         tuple(doubts),
+    )
+
+
+def _evidence(facts: Mapping[str, Any]) -> tuple[str, ...]:
+    """What was measured of a tower, in words."""
+    bearings = sorted(facts["wire_bearings"])
+    wires = "no wires are seen to leave it"
+    if bearings:
+        towards = " and ".join(f"{bearing:.0f}°" for bearing in bearings)
+        wires = f"wires leave its head towards {towards} from north"
+    return (
+        f"it stands {facts['height']:.0f} m tall on the ground at {facts['base_elevation']:.0f} m",
+        f"its body is {facts['width']:.0f} m wide where nothing touches it",
+        wires,
     )
 
 

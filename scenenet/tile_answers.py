@@ -12,6 +12,7 @@ import numpy as np
 
 from scenenet.coverage import LOOK_M, edge_distance
 from scenenet.detection import DetectedTower, DetectionSettings, detect_towers
+from scenenet.occupied import OccupiedPlaces
 from scenenet.progress import track
 from scenenet.tiles import EDGE, Tile, TileSpool, code_of, groups
 
@@ -99,11 +100,11 @@ class TileAnswers:
         if not zyx:
             return []
         detected = np.concatenate(zyx)
-        centres = self.spool.centres(detected)
+        occupied = OccupiedPlaces(self.spool)
         found = detect_towers(
-            centres,
+            self.spool.centres(detected),
             np.concatenate(probability),
-            self._occupied_near(centres[:, :2], settings.foot_radius + settings.eps),
+            occupied,
             self.spool.voxel_size,
             settings,
         )
@@ -111,7 +112,7 @@ class TileAnswers:
         towers = []
         for number, tower in enumerate(found, start=1):
             place = np.array([tower.x, tower.y])
-            ground = self._occupied_near(place[None], LOOK_M * 1.5)[:, :2]
+            ground = occupied(place, LOOK_M * 1.5)[:, :2]
             towers.append(
                 SurveyTower(
                     tower,
@@ -138,32 +139,6 @@ class TileAnswers:
             shares[rows] = answer.shares[at]
         named = {f"share_{geneo}": shares[:, k] for k, geneo in enumerate(geneos)}
         return {"tower_probability": probability, "tower_id": tower} | named
-
-    def _occupied_near(self, places: np.ndarray, distance: float) -> np.ndarray:
-        """(M, 3) m, middles of the occupied voxels within planar ``distance`` of places (P, 2)."""
-        from scipy.spatial import cKDTree
-
-        if len(places) == 0:
-            return np.empty((0, 3))
-        offset = places.mean(axis=0)
-        tree = cKDTree(places - offset)
-        near = [np.empty((0, 3))]
-        edge = EDGE * self.spool.voxel_size
-        for code in self._tiles_near(places, distance, edge):
-            centres = self.spool.centres(self.spool.tile(code).zyx())
-            apart, _ = tree.query(centres[:, :2] - offset, distance_upper_bound=distance)
-            near.append(centres[np.isfinite(apart)])
-        return np.concatenate(near)
-
-    def _tiles_near(self, places: np.ndarray, distance: float, edge: float) -> list[int]:
-        """Codes of the tiles whose plan comes within ``distance`` of a place."""
-        near = []
-        for code, place in self.spool.places():
-            low = np.array([place[2], place[1]]) * edge
-            outside = np.maximum(0, np.maximum(low - places, places - (low + edge)))
-            if (np.hypot(outside[:, 0], outside[:, 1]) <= distance).any():
-                near.append(code)
-        return near
 
     def _number(self, zyx: np.ndarray, number: int) -> None:
         """Write the number of a tower into its voxels (M, 3) on the lattice."""
@@ -192,8 +167,8 @@ def answer_tile(
     from scenenet.convolution import Occupancy, convolve_at_voxels
     from scenenet.models import SceneNet
 
-    kz, ky, kx = model.kernel_size
-    reach = kz // 2, ky // 2, kx // 2
+    model = model.at(spool.voxel_size)
+    reach = model.reach
     shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
     scene = spool.around(tile.place, reach)
     density = card.measurement == "density"
@@ -202,7 +177,10 @@ def answer_tile(
     inner = _inner(scene.voxel, shape, reach)
     with torch.no_grad():
         if isinstance(model, SceneNet):
-            parts = convolve_at_voxels(occupancy, model.weighted_kernels())[:, inner]
+            parts = convolve_at_voxels(occupancy, model.weighted_kernels())
+            # Reasons are those of the voxel whose answer it is.
+            rows = model.speakers(occupancy, parts.sum(dim=0))[inner]
+            parts = parts[:, torch.from_numpy(rows)]
             observed = parts.sum(dim=0)
             weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
             shares = (parts / weight).T.contiguous().numpy()

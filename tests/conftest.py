@@ -127,6 +127,69 @@ def real_samples(real_data: Path):
     return samples
 
 
+class Lattice:
+    """Middles of occupied voxels of 1 m, placed by hand around ``PLACE``; ground from 0 to 1 m."""
+
+    place = PLACE
+
+    @staticmethod
+    def voxels(places: np.ndarray) -> np.ndarray:
+        """Those that hold places (M, 3), m from ``PLACE``, each once."""
+        return np.unique(np.floor(places), axis=0) + 0.5 + PLACE
+
+    @classmethod
+    def ground(cls, half: float = 30.0, slope: float = 0.0) -> np.ndarray:
+        """A square of ground that rises by ``slope`` m a metre towards the east."""
+        x, y = (side.ravel() for side in np.meshgrid(*[np.arange(-half, half)] * 2))
+        return cls.voxels(np.column_stack([x, y, slope * x]))
+
+    @classmethod
+    def column(cls, x: float, y: float, low: float, high: float) -> np.ndarray:
+        """Voxels above one another, from ``low`` up to below ``high`` m."""
+        z = np.arange(low, high)
+        return cls.voxels(np.column_stack([np.full(len(z), x), np.full(len(z), y), z]))
+
+    @classmethod
+    def wires(
+        cls,
+        bearing: float,
+        height: float,
+        x: float = 0.0,
+        y: float = 0.0,
+        end: float = 28.0,
+        beside: tuple[float, ...] = (-1.5, 0.0, 1.5),
+    ) -> np.ndarray:
+        """Conductors from (x, y) towards a bearing in degrees, falling by 1 m on the way."""
+        s = np.arange(0, end, 0.25)
+        east, north = np.sin(np.radians(bearing)), np.cos(np.radians(bearing))
+        lines = [
+            np.column_stack(
+                [x + s * east + t * north, y + s * north - t * east, height - s / max(end, 1)]
+            )
+            for t in beside
+        ]
+        return cls.voxels(np.concatenate(lines))
+
+    @classmethod
+    def tree(cls, x: float, y: float, height: float, seed: int = 0) -> np.ndarray:
+        """A conifer: a cone of voxels, widest at a quarter of its height."""
+        rng = np.random.default_rng(seed)
+        z = rng.uniform(height / 4, height, 400)
+        away = 4 * (1 - z / height) * np.sqrt(rng.uniform(0, 1, 400))
+        turn = rng.uniform(0, 2 * np.pi, 400)
+        crown = np.column_stack([x + away * np.cos(turn), y + away * np.sin(turn), z])
+        return np.unique(np.concatenate([cls.voxels(crown), cls.column(x, y, 1, height)]), axis=0)
+
+    @staticmethod
+    def together(*parts: np.ndarray) -> np.ndarray:
+        return np.unique(np.concatenate(parts), axis=0)
+
+
+@pytest.fixture(scope="session")
+def lattice() -> type[Lattice]:
+    return Lattice
+
+
 @dataclass(frozen=True)
 class Chain:
     """Files of a survey on its way to training: paths of the survey, manifests and split."""

@@ -6,111 +6,166 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from sklearn.cluster import DBSCAN
 
-from scenenet.detection import DetectionSettings, detect_towers
-
-ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])
+from scenenet.detection import DetectionSettings, among, detect_towers
 
 
-def column(x: float, y: float, low: int, high: int) -> np.ndarray:
-    """Middles of voxels of 1 m above one another, from ``low`` up to below ``high`` m."""
-    z = np.arange(low, high) + 0.5
-    return np.column_stack([np.full(len(z), x), np.full(len(z), y), z]) + ORIGIN
+@pytest.fixture(scope="module")
+def pole(lattice):
+    """A function that makes a pole with wires towards two sides: (all its voxels, its body)."""
+
+    def make(x=0.0, y=0.0, height=15, bearings=(80, 260)):
+        body = lattice.column(x, y, 0, height)
+        wires = [lattice.wires(b, height - 0.5, x=x + 0.5, y=y + 0.5) for b in bearings]
+        return lattice.together(body, *wires), body
+
+    return make
 
 
-def ground(size: float = 40.0) -> np.ndarray:
-    x, y = np.meshgrid(np.arange(-size, size), np.arange(-size, size))
-    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 0.5)]) + ORIGIN
+def detect(detected, around, probability=0.9, **changes):
+    given_probability = np.broadcast_to(np.asarray(probability, float), len(detected))
+    return detect_towers(
+        detected, given_probability, among(around), 1.0, DetectionSettings(**changes)
+    )
 
 
-def detect(centres, probability=0.9, surroundings=None, voxel_size=1.0, **changes):
-    given_probability = np.broadcast_to(np.asarray(probability, float), len(centres))
-    around = ground() if surroundings is None else surroundings
-    settings = DetectionSettings(**changes)
-    return detect_towers(centres, given_probability, around, voxel_size, settings)
+def upper(body, by=5):
+    """The part of a pole that a model detects: not its foot."""
+    return body[np.argsort(body[:, 2])][by:]
 
 
-def test_nothing_detected_no_tower():
-    assert detect(np.empty((0, 3))) == []
+def test_nothing_detected_no_tower(lattice):
+    assert detect(np.empty((0, 3)), lattice.ground()) == []
 
 
-def test_a_column_is_a_tower_with_its_place_foot_and_height():
-    [tower] = detect(column(3.0, -2.0, 5, 15))
-    assert (tower.x, tower.y) == pytest.approx((500_003.0, 4_629_998.0))
-    assert tower.base == pytest.approx(100.0)  # the ground, not the lowest detected voxel
+def test_a_pole_with_wires_is_a_tower_and_all_is_measured(lattice, pole):
+    around, body = pole(3, -2)
+    [tower] = detect(upper(body), lattice.together(lattice.ground(), around))
+    x, y, _ = lattice.place
+    assert (tower.x, tower.y) == pytest.approx((x + 3.5, y - 1.5), abs=0.1)
+    assert tower.base == pytest.approx(lattice.place[2])
     assert tower.height == pytest.approx(15.0)
+    assert tower.width == pytest.approx(1.0)
+    assert tower.upright == 1.0
     assert tower.voxels.tolist() == list(range(10))
+    assert tower.probability == 0.9
+    assert sorted(round(s.bearing) for s in tower.spans) == pytest.approx([80, 260], abs=3)
 
 
-def test_a_voxel_pulls_the_centre_as_strongly_as_it_is_probable():
-    both = np.concatenate([column(0.0, 0.0, 0, 10), column(4.0, 0.0, 0, 10)])
-    [tower] = detect(both, np.repeat([0.75, 0.25], 10))
-    assert tower.x - ORIGIN[0] == pytest.approx(1.0)
-    assert tower.probability == 0.75
+@pytest.mark.parametrize("bearings", [(), (80,), (80, 260), (80, 200)])
+def test_wires_make_the_tower(lattice, pole, bearings):
+    around, body = pole(bearings=bearings)
+    found = detect(upper(body), lattice.together(lattice.ground(), around))
+    assert [len(t.spans) for t in found] == ([len(bearings)] if bearings else [])
+    lone = detect(upper(body), lattice.together(lattice.ground(), around), min_wire=0)
+    assert len(lone) == 1
 
 
-def test_what_lies_above_one_another_is_one_tower_however_far():
-    parts = np.concatenate([column(0, 0, 0, 3), column(0, 0, 30, 33)])
-    assert len(detect(parts)) == 1
+def test_a_pole_at_the_edge_of_the_data_is_a_tower(lattice, pole):
+    around, body = pole()
+    everything = lattice.together(lattice.ground(), around)
+    assert len(detect(upper(body), everything[everything[:, 0] >= lattice.place[0] - 2])) == 1
 
 
-def test_what_lies_further_apart_than_eps_is_two_towers():
-    for apart, n in ((5.9, 1), (6.1, 2)):
-        assert len(detect(np.concatenate([column(0, 0, 0, 12), column(apart, 0, 0, 12)]))) == n
+def test_a_tower_without_ground_or_much_of_its_wires_is_a_tower(lattice, pole):
+    around, body = pole(height=30)
+    near = np.hypot(*(around - lattice.place)[:, :2].T) < 15
+    [tower] = detect(upper(body), around[near])
+    assert tower.height == pytest.approx(30, abs=3)
 
 
-def test_a_bush_is_no_tower():
-    assert detect(column(0, 0, 0, 8)) == []
-    assert len(detect(column(0, 0, 0, 8), min_height=7.0, min_body=7.0)) == 1
+def test_a_tree_detected_from_foot_to_top_is_none(lattice):
+    tree = lattice.tree(0, 0, 18)
+    trunk = lattice.column(0, 0, 3, 18)
+    wood = [lattice.tree(x, y, 17, seed=x + y + 30) for x in (-9, 0, 9) for y in (-9, 9)]
+    assert detect(trunk, lattice.together(lattice.ground(), tree)) == []
+    assert detect(trunk, lattice.together(lattice.ground(), tree, *wood)) == []
 
 
-def test_a_treetop_seen_at_one_place_is_no_tower_however_high():
-    top = column(0, 0, 15, 20)
-    assert detect(top) == []
-    assert len(detect(top, min_body=5.0)) == 1
+def test_wires_above_one_another_without_a_tower_are_none(lattice):
+    levels = [lattice.wires(b, z, beside=(0.0,)) for b in (80, 260) for z in (18, 24, 30)]
+    above = np.concatenate([lattice.column(0, 0, z, z + 1) for z in (17, 18, 23, 24, 29, 30)])
+    around = lattice.together(lattice.ground(), above, *levels)
+    assert detect(above, around) == []
+    assert len(detect(above, around, min_upright=0.0)) == 1
 
 
-def test_a_few_voxels_are_no_tower():
-    far_apart = column(0, 0, 0, 20)[[0, -1]]
-    assert detect(far_apart) == []
-    assert len(detect(far_apart, min_voxels=2)) == 1
+def test_a_wall_under_wires_is_none(lattice):
+    x, y, z = (v.ravel() for v in np.meshgrid(np.arange(-9, 10), np.arange(-9, 10), np.arange(15)))
+    block = lattice.voxels(np.column_stack([x, y, z]))
+    line = [lattice.wires(b, 15) for b in (80, 260)]
+    assert detect(upper(lattice.column(0, 0, 0, 15)), lattice.together(block, *line)) == []
 
 
-def test_one_return_from_below_the_ground_does_not_make_a_tower_of_a_bush():
-    below = np.concatenate([ground(), ORIGIN[None] - np.array([0, 0, 30])])
-    assert detect(column(0, 0, 0, 6), surroundings=below) == []
+def test_a_low_post_is_none(lattice, pole):
+    around, body = pole(height=8)
+    everything = lattice.together(lattice.ground(), around)
+    assert detect(upper(body, 3), everything) == []
+    assert len(detect(upper(body, 3), everything, min_height=7.0)) == 1
 
 
-def test_a_tower_on_a_slope_stands_on_the_ground_at_its_foot():
-    slope = ground()
-    slope[:, 2] += slope[:, 0] - ORIGIN[0]  # 45 degrees
-    [tower] = detect(column(0, 0, 5, 20), surroundings=slope)
-    assert tower.base == pytest.approx(100.0, abs=5.0)  # and not 40 m down the hill
+def test_a_few_detected_voxels_are_enough_and_two_are_not(lattice, pole):
+    around, body = pole()
+    everything = lattice.together(lattice.ground(), around)
+    assert len(detect(upper(body, 12), everything)) == 1
+    assert detect(upper(body, 13), everything) == []
+    assert len(detect(upper(body, 13), everything, min_voxels=2, min_body=2.0)) == 1
 
 
-def test_towers_come_with_the_most_probable_first():
-    three = [column(x, 0, 0, 12) for x in (0, 50, 100)]
-    towers = detect(np.concatenate(three), np.repeat([0.5, 0.9, 0.7], 12))
-    assert [round(t.x - ORIGIN[0]) for t in towers] == [50, 100, 0]
+def test_what_is_detected_at_one_height_is_none(lattice, pole):
+    around, _ = pole()
+    head = lattice.voxels(np.array([[x, 0, 14.0] for x in range(-3, 4)]))
+    assert detect(head, lattice.together(lattice.ground(), around, head)) == []
 
 
-@settings(max_examples=30)
-@given(st.integers(0, 1000), st.integers(1, 60))
-def test_towers_are_the_planar_clusters_of_the_voxels(seed, n):
-    rng = np.random.default_rng(seed)
-    centres = rng.integers(0, 40, (n, 3)) + ORIGIN + 0.5
-    labels = DBSCAN(eps=3.0, min_samples=1).fit_predict(centres[:, :2] - ORIGIN[:2])
-    found = detect(centres, eps=3.0, min_voxels=1, min_height=0.0, min_body=0.0)
-    groups = {frozenset(np.flatnonzero(labels == label).tolist()) for label in set(labels)}
-    assert {frozenset(t.voxels.tolist()) for t in found} == groups
+def test_detected_ends_of_a_crossarm_are_the_same_tower(lattice, pole):
+    around, body = pole(height=40)
+    arm = np.concatenate([lattice.column(s * 9, 0, 30, 36) for s in (-1, 1)])
+    everything = lattice.together(lattice.ground(), around, arm)
+    [tower] = detect(np.concatenate([upper(body, 20), arm]), everything)
+    assert abs(tower.x - lattice.place[0] - 0.5) < 0.6
+    assert len(tower.voxels) == 20 + len(arm)
+
+
+def test_towers_along_a_line_are_as_many_as_they_are(lattice, pole):
+    parts = [pole(x, 0) for x in (-60, 0, 60)]
+    around = lattice.together(lattice.ground(90), *(a for a, _ in parts))
+    detected = np.concatenate([upper(b) for _, b in parts])
+    towers = detect(detected, around, np.repeat([0.5, 0.9, 0.7], 10))
+    assert [round(t.x - lattice.place[0] - 0.5) for t in towers] == [0, 60, -60]  # surest first
+    assert [t.voxels.tolist() for t in towers] == [
+        list(range(10, 20)), list(range(20, 30)), list(range(10))
+    ]  # fmt: skip
+
+
+def test_a_tree_beside_a_tower_does_not_hide_it(lattice, pole):
+    around, body = pole()
+    everything = lattice.together(lattice.ground(), around, lattice.tree(4, -5, 11))
+    detected = np.concatenate([upper(body), lattice.column(4, -5, 4, 9)])
+    [tower] = detect(detected, everything)
+    assert np.hypot(*(np.array([tower.x, tower.y]) - lattice.place[:2] - 0.5)) < 1.0
 
 
 @settings(max_examples=20)
-@given(st.permutations(range(24)))
-def test_order_of_voxels_does_not_matter(order):
-    centres = np.concatenate([column(0, 0, 0, 12), column(30, 0, 0, 12)])
-    probability = np.linspace(0.5, 0.9, 24)
-    one, other = detect(centres, probability), detect(centres[order], probability[order])
+@given(st.permutations(range(20)))
+def test_order_of_voxels_does_not_matter(lattice, pole, order):
+    parts = [pole(x, 0) for x in (0, 60)]
+    around = lattice.together(lattice.ground(90), *(a for a, _ in parts))
+    detected = np.concatenate([upper(b) for _, b in parts])
+    probability = np.linspace(0.5, 0.9, 20)
+    one = detect(detected, around, probability)
+    other = detect(detected[order], around, probability[order])
     for a, b in zip(one, other, strict=True):
         assert (a.x, a.y, a.base, a.height) == pytest.approx((b.x, b.y, b.base, b.height))
+        assert set(a.voxels.tolist()) == {order[v] for v in b.voxels}
+
+
+@settings(max_examples=10)
+@given(st.floats(-3e5, 3e5), st.floats(-3e5, 3e5))
+def test_where_a_tower_stands_does_not_matter(lattice, pole, east, north):
+    around, body = pole()
+    move = np.round([east, north, 0])
+    [here] = detect(upper(body), lattice.together(lattice.ground(), around))
+    [there] = detect(upper(body) + move, lattice.together(lattice.ground(), around) + move)
+    assert (there.x - here.x, there.y - here.y) == pytest.approx(tuple(move[:2]), abs=1e-6)
+    assert there.height == pytest.approx(here.height)

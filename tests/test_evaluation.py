@@ -19,6 +19,8 @@ from scenenet.voxels import VoxelGrid, VoxelSample
 
 SHAPE = (12, 3, 30)
 GRID = VoxelGrid((0.0, 0.0, 0.0), 1.0, SHAPE)
+LONE_POLES = DetectionSettings(min_wire=0)
+"""For scenes of poles without wires."""
 CARD = ModelCard(
     name="mock", codes="edp", measurement="presence", fit="metric", resolution=64, voxel_size=1.0,
     tau=0.5, provenance={"seed": 4},
@@ -67,7 +69,7 @@ def crop(number: int, *xs: int, empty=()):
 def scores(model: Mock, *crops, tau: float = 0.5):
     samples, of_samples = zip(*crops, strict=True)
     dataset = Dataset(list(samples), list(of_samples), "edp", [])
-    return score(model, CARD.with_tau(tau), dataset, DetectionSettings())
+    return score(model, CARD.with_tau(tau), dataset, LONE_POLES)
 
 
 def test_a_perfect_model_scores_one():
@@ -148,13 +150,13 @@ def test_scores_are_plain_numbers():
 def test_without_tau_there_is_no_score():
     untuned = CARD.model_copy(update={"tau": None})
     with pytest.raises(InputError, match="no detection threshold"):
-        score(Mock(), untuned, Dataset([], [], "edp", []), DetectionSettings())
+        score(Mock(), untuned, Dataset([], [], "edp", []), LONE_POLES)
 
 
 def test_only_the_part_asked_for_is_scored(chain, pole_finder, tmp_path):
     write_model(tmp_path / "m.json", *pole_finder)
     found = {
-        part: evaluate(tmp_path / "m.json", [chain.voxels], chain.split, DetectionSettings(), part)
+        part: evaluate(tmp_path / "m.json", [chain.voxels], chain.split, LONE_POLES, part)
         for part in ("train", "validation", "test")
     }
     assert {p: r["voxel"]["n_samples"] for p, r in found.items()} == {

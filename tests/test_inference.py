@@ -25,6 +25,8 @@ from scenenet.tuning import choose
 
 POLE = (500_020.5, 4_630_031.5)
 DUTCH_TOWER_HEIGHT_M = 42.0
+LONE_POLES = DetectionSettings(min_wire=0)
+"""For scenes of poles without wires."""
 ADDED = {
     "tower_probability": np.float32,
     "tower_id": np.uint32,
@@ -48,11 +50,17 @@ class Prediction:
         return laspy.read(self.laz)
 
 
-def predict(survey: Path, model: Path, folder: Path, **settings) -> Prediction:
+def predict(
+    survey: Path,
+    model: Path,
+    folder: Path,
+    detection: DetectionSettings = LONE_POLES,
+    **settings,
+) -> Prediction:
     folder.mkdir(exist_ok=True)
     laz, geojson, summary = (folder / n for n in ("out.laz", "towers.geojson", "summary.json"))
     returned = predict_survey(
-        survey, model, laz, geojson, summary, PredictSettings(**settings), DetectionSettings()
+        survey, model, laz, geojson, summary, PredictSettings(**settings), detection
     )
     assert json.loads(summary.read_text()) == returned
     return Prediction(laz, json.loads(geojson.read_text()), returned)
@@ -122,6 +130,26 @@ def test_the_tower_is_listed_where_it_stands(predicted):
     assert crs == "urn:ogc:def:crs:EPSG::32629"
 
 
+def test_wires_are_listed_with_their_tower_and_a_lone_pole_is_none(scene, model, tmp_path):
+    cloud = scene([(20.5, 31.5), (60.5, 31.5)], size=(81.0, 60.0), tree=None)
+    s = np.arange(-28, 28, 0.2)
+    x, y = POLE
+    wire = np.column_stack([np.full(len(s), x), y + s, 113.8 - s**2 / 1000])
+    line = PointCloud(
+        np.concatenate([cloud.xyz, wire]),
+        np.append(cloud.classification, np.full(len(wire), 16, np.uint8)),
+    )
+    write_las(tmp_path / "line.laz", line)
+    found = predict(tmp_path / "line.laz", model, tmp_path / "out", DetectionSettings())
+    [tower] = found.towers["features"]
+    assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.6)
+    told = tower["properties"]
+    assert told["wire_directions"] == 2
+    assert sorted(round(b) % 360 for b in told["wire_bearings"]) == [0, 180]
+    assert 1.0 <= told["width"] <= 2.0
+    assert set(np.unique(found.points["tower_id"])) == {0, 1}
+
+
 def test_the_points_of_the_tower_carry_its_number(predicted):
     points = predicted.points
     of_tower = points["tower_id"] == 1
@@ -166,7 +194,7 @@ def test_the_summary_says_what_was_done(predicted, survey):
     assert summary["tau"] == 0.7
     assert summary["voxel_size_m"] == 1.0
     assert summary["kernel_size"] == [9, 9, 9]
-    assert summary["settings"]["detection"] == DetectionSettings().model_dump()
+    assert summary["settings"]["detection"] == LONE_POLES.model_dump()
 
 
 @pytest.mark.parametrize("chunk_points", [997, 10**9])

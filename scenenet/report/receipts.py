@@ -96,6 +96,7 @@ def _section(receipt: Receipt, xyz: np.ndarray, views: list[View], picture: Path
             ]
         )
     ]
+    blocks.append(Notes("What stands there", receipt.evidence))
     if receipt.contributions:
         frame = pd.DataFrame(receipt.contributions, columns=["geneo", "share", "said"])
         columns = [

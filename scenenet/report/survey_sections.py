@@ -94,6 +94,8 @@ def _tower_list(survey: str, geojson: Mapping[str, Any]) -> Block:
         Column("y", "y [m]", "metres"),
         Column("height", "height [m]", "metres"),
         Column("base_elevation", "base elevation [m]", "metres"),
+        Column("width", "width [m]", "metres"),
+        Column("wire_directions", "directions of wires", "count"),
         Column("probability", "probability", "score"),
         Column("points", "points", "count"),
         Column("edge_distance", "from the edge of the data [m]", "metres"),

@@ -15,9 +15,10 @@ import pandas as pd
 from scenenet.files import atomic
 from scenenet.models import SceneNet, new_model
 from scenenet.progress import track
-from scenenet.protocol import ModelSettings
+from scenenet.protocol import ModelSettings, SearchSettings
 from scenenet.search import (
     Scene,
+    Score,
     State,
     advance,
     begin,
@@ -43,7 +44,8 @@ def fit_field(
     """Search for the numbers of a new SCENE-Net in metres; as ``scenenet.training.fit``.
 
     A row of the history is a generation of the search: loss is 1 - F0.5 on the training crops, as
-    the search weighs it, of the best numbers so far, whose parameters follow.
+    the search weighs it, of the best numbers so far, whose parameters follow. Several searches are
+    begun, and the rows are those of the one that was gone on with; ``search`` is its number.
 
     Args:
         identity: of all that a checkpoint depends on.
@@ -53,25 +55,50 @@ def fit_field(
     learnt = scenes_of(model, training, settings.measurement)
     kept = scenes_of(model, validation, settings.measurement)
     score = scorer(model, learnt)
+    search = settings.search
+
+    def row(state: State, seconds: float) -> dict[str, float]:
+        model.set_numbers(state.best)
+        return _row(model, state, kept, settings, seconds)
+
     state, history = _resume(checkpoint, identity)
     if state is None:
-        starts = draws(model, settings.search.starts, np.random.default_rng([seed, 0]))
-        state = begin(starts, score, settings.search.step)
-    label = f"{settings.name} seed {seed}: generations"
-    last = settings.search.generations
-    for generation in track(range(state.generation + 1, last + 1), label):
         started = time.perf_counter()
-        # The draws follow from seed and generation alone: a resumed search draws the same.
-        rng = np.random.default_rng([seed, generation])
-        state = advance(state, score, settings.search.population, rng)
-        if generation == last:
+        trials = [_trial(model, score, search, [seed, n]) for n in range(search.searches)]
+        chosen = max(range(len(trials)), key=lambda n: trials[n][-1].best_score)
+        each = (time.perf_counter() - started) / max(1, search.trial)
+        state = trials[chosen][-1]
+        history = [row(s, each) | {"search": chosen} for s in trials[chosen][1:]]
+    chosen = int(history[0]["search"]) if history else 0
+    label = f"{settings.name} seed {seed}: generations"
+    for generation in track(range(state.generation + 1, search.generations + 1), label):
+        started = time.perf_counter()
+        # The draws follow from these numbers alone: a resumed search draws the same.
+        rng = np.random.default_rng([seed, chosen, generation])
+        state = advance(state, score, search.population, rng)
+        if generation == search.generations:
             state = settled(state, score)
-        model.set_numbers(state.best)
-        history.append(_row(model, state, kept, settings, time.perf_counter() - started))
+        history.append(row(state, time.perf_counter() - started) | {"search": chosen})
         if checkpoint is not None:
             _save(checkpoint, identity, state, history)
     model.set_numbers(state.best)
     return model, pd.DataFrame(history)
+
+
+def _trial(
+    model: SceneNet, score: Score, settings: SearchSettings, entropy: list[int]
+) -> list[State]:
+    """The first generations of a search, its beginning included.
+
+    Some searches end where the negative sphere has no weight and no draw about them is better, so
+    several are begun.
+    """
+    starts = draws(model, settings.starts, np.random.default_rng([*entropy, 0]))
+    states = [begin(starts, score, settings.step)]
+    for generation in range(1, min(settings.trial, settings.generations - 1) + 1):
+        rng = np.random.default_rng([*entropy, generation])
+        states.append(advance(states[-1], score, settings.population, rng))
+    return states
 
 
 def _row(

@@ -46,11 +46,15 @@ class FieldSettings(Settings):
 class SearchSettings(Settings):
     """How the eleven numbers of a SCENE-Net in metres are found."""
 
+    searches: int = Field(
+        4, ge=1, description="searches that are begun; the best of them is gone on with"
+    )
+    trial: int = Field(15, ge=0, description="generations after which the best is chosen")
     starts: int = Field(
-        128, ge=1, description="numbers drawn at first; the search begins at the best of them"
+        64, ge=1, description="numbers drawn at first for each; it begins at the best of them"
     )
     population: int = Field(14, ge=4, description="numbers tried in a generation")
-    generations: int = Field(60, ge=1, description="steps of the search")
+    generations: int = Field(60, ge=1, description="steps of a search, the trial among them")
     step: float = Field(0.7, gt=0, description="first step size, in units of the logit")
 
 

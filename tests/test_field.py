@@ -25,7 +25,7 @@ SMALL = FieldSettings(radius=2.0, above=3.0, below=3.0)
 
 
 def settings(generations: int = 6, **changes) -> ModelSettings:
-    search = SearchSettings(starts=24, population=8, generations=generations)
+    search = SearchSettings(searches=2, trial=2, starts=12, population=8, generations=generations)
     return ModelSettings(
         name="m", kind="scenenet", protocol="field", field=SMALL, search=search, **changes
     )
@@ -108,7 +108,7 @@ class PowerCut(Exception):
 
 def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
     straight, straight_history = fit(toys[:2], [], settings(5), 1)
-    original, done = field.advance, iter(range(2))
+    original, done = field.advance, iter(range(2 * 2 + 1))  # trials and one more
 
     def interrupted(*args):
         if next(done, None) is None:

@@ -27,10 +27,10 @@ class Arrow(GeneoKernel):
 
     name = "arrow"
     parameters = (
-        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 2.0)),
-        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around both radii", (0.15, 4.0)),
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5)),
+        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around both radii", (0.15, 2.25)),
         ShapeParameter(
-            "r_c", 0.5, 3.0, "voxel", "reach of the tower's head, where the lines meet", (0.3, 4.0)
+            "r_c", 0.5, 3.0, "voxel", "reach of the tower's head, where the lines meet", (0.3, 1.5)
         ),
         ShapeParameter("beta", 0.1, 0.9, "1", "inclination of the head", (0.05, 0.95)),
     )

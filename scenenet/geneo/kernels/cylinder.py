@@ -16,8 +16,8 @@ class Cylinder(GeneoKernel):
 
     name = "cylinder"
     parameters = (
-        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 2.0)),
-        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius", (0.15, 4.0)),
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5)),
+        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius", (0.15, 2.25)),
     )
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:

@@ -16,8 +16,8 @@ class NegativeSphere(GeneoKernel):
 
     name = "negative_sphere"
     parameters = (
-        ShapeParameter("r", 0.5, 3.0, "voxel", "radius of the crowns it weighs", (0.1, 3.0)),
-        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius", (0.15, 4.0)),
+        ShapeParameter("r", 0.5, 3.0, "voxel", "radius of the crowns it weighs", (0.1, 1.5)),
+        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius", (0.15, 2.25)),
         ShapeParameter("omega", 0.05, 0.15, "1", "weight against full surroundings", (0.02, 0.6)),
     )
 

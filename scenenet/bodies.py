@@ -79,8 +79,8 @@ def standing(
 
 def middle(
     around: np.ndarray, axis: np.ndarray, body: Body, voxel_size: float
-) -> tuple[np.ndarray, float]:
-    """Axis (2,) m in the middle of a body, and the width of the body in m.
+) -> tuple[np.ndarray, float, float]:
+    """Axis (2,) m in the middle of a body, its width in m, and the share of it that stands free.
 
     Level by level, what hangs together there and comes near the axis is the body, as long as it is
     slim. Where it is not, a wire, a tree or a building touches it. Where that is so at all levels,
@@ -91,11 +91,11 @@ def middle(
     slim = max(SLIM_M, SLIM * body.height)
     relative = around - np.array([*axis, body.base])
     low, high = (part * body.height for part in MIDDLE)
-    free = (relative[:, 2] >= low) & (relative[:, 2] <= high)
-    places = relative[free & (np.hypot(relative[:, 0], relative[:, 1]) <= 4 * slim)]
-    at, width = np.zeros(2), float("nan")
+    between = (relative[:, 2] >= low) & (relative[:, 2] <= high)
+    places = relative[between & (np.hypot(relative[:, 0], relative[:, 1]) <= 4 * slim)]
+    at, width, free = np.zeros(2), float("nan"), 0.0
     if len(places) == 0:
-        return axis, width
+        return axis, width, free
     steps = np.rint((places - places.min(axis=0)) / voxel_size).astype(int)
     volume = np.zeros(steps.max(axis=0) + 1, bool)
     volume[tuple(steps.T)] = True
@@ -114,4 +114,5 @@ def middle(
                 widths.append(size.max())
         if middles:
             at, width = np.median(middles, axis=0), float(np.median(widths))
-    return axis + at, width
+            free = len(middles) / len(np.unique(steps[mine, 2]))
+    return axis + at, width, free

@@ -7,6 +7,7 @@ depend on how much of it a model finds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
@@ -21,6 +22,14 @@ from scenenet.wires import FAR, SCALES, Span, leaving_spans
 class DetectionSettings(Settings):
     """What makes a tower of detected voxels."""
 
+    look: float = Field(
+        0.5,
+        gt=0,
+        le=1,
+        description="of the observer's answer at tau; a tower is looked for where the answer is "
+        "this strong. Where it does not reach tau, a tower must have wires towards two sides and "
+        "stand free",
+    )
     eps: float = Field(
         6.0,
         gt=0,
@@ -59,8 +68,19 @@ class DetectionSettings(Settings):
         ge=0,
         description="of the way from 3 to 20 m off the axis, or to the edge of the data, that "
         "wires must be followed from the head, all directions together; 0 to ask for none. Trees, "
-        "cranes, lone poles and roofs have none",
+        "cranes, lone poles and roofs have none. Twice as much where tau is not reached",
     )
+    min_free: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="share of the body at which nothing may touch it where tau is not reached: a "
+        "tree under a line has its crown",
+    )
+
+    def threshold(self, tau: float) -> float:
+        """Probability from which voxels are looked at, where tau makes one a tower's."""
+        return tau if tau >= 1 else math.tanh(self.look * math.atanh(tau))
 
 
 @dataclass(frozen=True)
@@ -108,12 +128,13 @@ def detect_towers(
     probability: np.ndarray,
     surroundings: Surroundings,
     voxel_size: float,
+    tau: float,
     settings: DetectionSettings,
 ) -> list[DetectedTower]:
     """Find the towers among detected voxels, highest probability first.
 
     Args:
-        centres: (V, 3) m, middles of the voxels with probability >= tau.
+        centres: (V, 3) m, middles of the voxels with probability >= ``settings.threshold(tau)``.
         probability: (V,).
         surroundings: tells the occupied voxels around a place.
         voxel_size: m.
@@ -125,7 +146,7 @@ def detect_towers(
     found = []
     for axis in _neighbours_together(_axes(detected, settings)):
         around = surroundings(axis + offset[:2], LOOK_M) - offset
-        tower = _measure(detected, axis, around, settings)
+        tower = _measure(detected, axis, around, tau, settings)
         if tower is not None:
             found.append(tower)
     x, y, z = (float(metres) for metres in offset)
@@ -210,7 +231,11 @@ def _neighbours_together(axes: Iterable[np.ndarray]) -> list[np.ndarray]:
 
 
 def _measure(
-    detected: _Detected, axis: np.ndarray, around: np.ndarray, settings: DetectionSettings
+    detected: _Detected,
+    axis: np.ndarray,
+    around: np.ndarray,
+    tau: float,
+    settings: DetectionSettings,
 ) -> DetectedTower | None:
     """The tower on an axis (2,) m, or None where what stands there is none.
 
@@ -227,8 +252,8 @@ def _measure(
     for _ in range(MEANS):
         seen = detected.within(axis, crossarm)
         axis = detected.mean(seen)
-    axis, width = middle(around, axis, body, size)
-    if not np.isfinite(width):
+    axis, width, free = middle(around, axis, body, size)
+    if free == 0:
         return None
     body = standing(around, axis, detected.centres[seen, 2], foot_radius, size)
     if body.height < settings.min_height or body.upright < settings.min_upright:
@@ -236,9 +261,12 @@ def _measure(
     x, y = float(axis[0]), float(axis[1])
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
     spans = leaving_spans(around, (x, y), body.base, body.height, crossarm, size)
-    if sum(span.followed for span in spans) < settings.min_wire:
-        return None
     peak = float(detected.probability[seen].max())
+    followed = sum(span.followed for span in spans)
+    if followed < settings.min_wire:
+        return None
+    if peak < tau and (followed < 2 * settings.min_wire or free < settings.min_free):
+        return None
     return DetectedTower(
         x, y, body.base, body.height, width, body.upright, tuple(spans), peak, seen
     )

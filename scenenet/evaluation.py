@@ -122,12 +122,13 @@ def crop_towers(
         probability: (V,) of every voxel of the sample's grid.
     """
     # A tower is made of points: a detected voxel that is empty has nothing to show a person.
-    detected = sample.index[probability[sample.index] >= tau]
+    detected = sample.index[probability[sample.index] >= detection.threshold(tau)]
     found = detect_towers(
         sample.grid.centres(detected),
         probability[detected],
         among(sample.grid.centres(sample.index)),
         sample.grid.voxel_size,
+        tau,
         detection,
     )
     return match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)

@@ -92,7 +92,7 @@ class TileAnswers:
         zyx, probability, shares, count = [], [], [], []
         for tile in self.spool.tiles():
             answer = self._read(code_of(tile.place))
-            hits = answer.probability >= tau
+            hits = answer.probability >= settings.threshold(tau)
             zyx.append(tile.zyx()[hits])
             probability.append(answer.probability[hits])
             shares.append(answer.shares[hits])
@@ -106,6 +106,7 @@ class TileAnswers:
             np.concatenate(probability),
             occupied,
             self.spool.voxel_size,
+            tau,
             settings,
         )
         all_shares, counts = np.concatenate(shares), np.concatenate(count)

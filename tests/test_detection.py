@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from scenenet.detection import DetectionSettings, among, detect_towers
 
+TAU = 0.5
+
 
 @pytest.fixture(scope="module")
 def pole(lattice):
@@ -25,7 +27,7 @@ def pole(lattice):
 def detect(detected, around, probability=0.9, **changes):
     given_probability = np.broadcast_to(np.asarray(probability, float), len(detected))
     return detect_towers(
-        detected, given_probability, among(around), 1.0, DetectionSettings(**changes)
+        detected, given_probability, among(around), 1.0, TAU, DetectionSettings(**changes)
     )
 
 
@@ -144,6 +146,32 @@ def test_a_tree_beside_a_tower_does_not_hide_it(lattice, pole):
     detected = np.concatenate([upper(body), lattice.column(4, -5, 4, 9)])
     [tower] = detect(detected, everything)
     assert np.hypot(*(np.array([tower.x, tower.y]) - lattice.place[:2] - 0.5)) < 1.0
+
+
+@pytest.mark.parametrize(("bearings", "n"), [((80,), 0), ((80, 260), 1)])
+def test_where_tau_is_not_reached_wires_leave_towards_two_sides(lattice, pole, bearings, n):
+    around, body = pole(bearings=bearings)
+    everything = lattice.together(lattice.ground(), around)
+    assert len(detect(upper(body), everything, probability=0.4)) == n
+    assert len(detect(upper(body), everything, probability=0.6)) == 1
+
+
+def test_a_tree_under_a_line_is_none_where_tau_is_not_reached(lattice):
+    x, y, z = (v.ravel() for v in np.meshgrid(np.arange(-6, 7), np.arange(-6, 7), np.arange(6, 15)))
+    crown = lattice.voxels(np.column_stack([x, y, z])[np.hypot(x, y) < 6])
+    line = [lattice.wires(b, 17.0) for b in (80, 260)]
+    trunk = lattice.column(0, 0, 0, 17)
+    around = lattice.together(lattice.ground(), trunk, crown, *line)
+    assert detect(upper(trunk), around, probability=0.4) == []
+    assert len(detect(upper(trunk), around, probability=0.4, min_free=0.1)) == 1
+
+
+def test_half_of_the_answer_at_tau_is_looked_at():
+    settings = DetectionSettings()
+    assert np.arctanh(settings.threshold(0.99)) == pytest.approx(np.arctanh(0.99) / 2)
+    assert settings.threshold(0.0) == 0.0
+    assert settings.threshold(1.0) == 1.0
+    assert DetectionSettings(look=1.0).threshold(0.7) == pytest.approx(0.7)
 
 
 @settings(max_examples=20)

@@ -155,7 +155,7 @@ def test_the_points_of_the_tower_carry_its_number(predicted):
     of_tower = points["tower_id"] == 1
     assert set(np.unique(points["tower_id"])) == {0, 1}
     assert of_tower.sum() == predicted.towers["features"][0]["properties"]["points"] > 100
-    assert (points["tower_probability"][of_tower] >= 0.7).all()
+    assert (points["tower_probability"][of_tower] >= LONE_POLES.threshold(0.7)).all()
     away = np.hypot(points.x[of_tower] - POLE[0], points.y[of_tower] - POLE[1])
     assert away.max() < 1.5
     # The upper half of the pole is known; its foot is in the clutter of the ground.

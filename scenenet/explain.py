@@ -60,7 +60,11 @@ def _receipt(feature: Mapping[str, Any], model: VoxelModel, card: ModelCard) -> 
         )
     if facts["wire_directions"] == 1 and facts["edge_distance"] >= FAR:
         doubts.append("wires leave it in one direction only: the end of a line, or no tower")
-    if card.tau is not None and facts["probability"] < (1 + card.tau) / 2:
+    if card.tau is not None and facts["probability"] < card.tau:
+        doubts.append(
+            f"its probability stays under tau, {card.tau:.3f}: its wires and its body speak for it"
+        )
+    elif card.tau is not None and facts["probability"] < (1 + card.tau) / 2:
         doubts.append(f"its probability is not far above tau, {card.tau:.3f}")
     x, y = feature["geometry"]["coordinates"][:2]
     return Receipt(

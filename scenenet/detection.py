@@ -252,8 +252,10 @@ def _measure(
     for _ in range(MEANS):
         seen = detected.within(axis, crossarm)
         axis = detected.mean(seen)
+    peak = float(detected.probability[seen].max())
     axis, width, free = middle(around, axis, body, size)
-    if free == 0:
+    # What costs least is asked first.
+    if free == 0 or (peak < tau and free < settings.min_free):
         return None
     body = standing(around, axis, detected.centres[seen, 2], foot_radius, size)
     if body.height < settings.min_height or body.upright < settings.min_upright:
@@ -261,11 +263,8 @@ def _measure(
     x, y = float(axis[0]), float(axis[1])
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
     spans = leaving_spans(around, (x, y), body.base, body.height, crossarm, size)
-    peak = float(detected.probability[seen].max())
     followed = sum(span.followed for span in spans)
-    if followed < settings.min_wire:
-        return None
-    if peak < tau and (followed < 2 * settings.min_wire or free < settings.min_free):
+    if followed < settings.min_wire * (1 if peak >= tau else 2):
         return None
     return DetectedTower(
         x, y, body.base, body.height, width, body.upright, tuple(spans), peak, seen

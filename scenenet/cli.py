@@ -140,8 +140,13 @@ def train(
         int, typer.Option(min=1, help="Passes over the crops, where training is by gradient.")
     ] = 150,
     learning_rate: Annotated[
-        float, typer.Option(min=1e-6, help="Step size of RMSProp, where training is by gradient.")
-    ] = 0.01,
+        float | None,
+        typer.Option(
+            min=1e-6,
+            help="Step size of RMSProp, where training is by gradient; 0.01 if not given, and "
+            "0.001 for a CNN of protocol field, which larger steps lead away from its start.",
+        ),
+    ] = None,
     resolution: Annotated[
         int, typer.Option(help="Voxels an edge of a crop: 32, 64, 128, 256.")
     ] = 64,
@@ -168,6 +173,8 @@ def train(
     in_metres = kind is Kind.scenenet and protocol is TrainedBy.field
     if validation is None:
         validation = 0.0 if in_metres else 0.3
+    if learning_rate is None:
+        learning_rate = 0.001 if protocol is TrainedBy.field else 0.01
     training = TrainingSettings(init=protocol.value, epochs=epochs, learning_rate=learning_rate)
     settings = ModelSettings(
         name=kind.value, kind=kind.value, protocol=protocol.value, training=training

@@ -14,13 +14,15 @@ import torch
 from torch import Tensor
 
 from scenenet.batches import batch
-from scenenet.convolution import convolution_gradient
-from scenenet.metrics import THRESHOLDS, ThresholdCurve
+from scenenet.convolution import convolve_at_voxels
+from scenenet.metrics import BETA, THRESHOLDS, ThresholdCurve
 from scenenet.models import CNN, SceneNet, VoxelModel, new_model
 from scenenet.observer import count_reached
 from scenenet.protocol import KernelSize, Measurement, ModelSettings
 from scenenet.voxels import VoxelSample
 
+MOST_VOXELS = 20_000
+"""Occupied voxels that a CNN's start is worked out from, beside those of towers."""
 DRAWS = 64
 """Sets of numbers that a SCENE-Net begins at the best of."""
 NOISE = 0.1
@@ -33,8 +35,8 @@ def informed_model(
     """A new model that begins where it tells the towers of ``training`` from the rest.
 
     A SCENE-Net is the best of ``DRAWS`` draws from its ranges, by the F0.5 at its best tau. The
-    kernels of a CNN are what is around tower voxels less what is around the other occupied ones,
-    scaled so that its observer is 1 at the mean tower voxel and -1 at the mean other one.
+    kernels of a CNN tell what is around tower voxels from what is around other occupied ones
+    (``discriminant``), with the bias at which F0.5 is highest.
     """
     first = new_model(settings, seed)
     if isinstance(first, CNN):
@@ -60,37 +62,69 @@ def _best_f05(
 
 
 def _towards_towers(model: CNN, training: Sequence[VoxelSample], measurement: Measurement) -> CNN:
-    around_tower, around_other = mean_surroundings(training, measurement, model.kernel_size)
-    difference = around_tower - around_other
-    at_tower = float((difference * around_tower).sum())
-    at_other = float((difference * around_other).sum())
-    gain = 2 / max(at_tower - at_other, 1e-6)
+    kernel = discriminant(training, measurement, model.kernel_size)
     n = len(model.bias)
     with torch.no_grad():
-        model.weight.mul_(NOISE).add_(gain * difference / n)
-        model.bias.mul_(NOISE).add_((1 - gain * at_tower) / n)
+        # In the size of a random start, so that steps of training mean the same to both.
+        kernel *= model.weight.sum(dim=0).norm() / kernel.norm().clamp(min=1e-9)
+        model.weight.mul_(NOISE).add_(kernel / n)
+        kernel, _ = model.observer()
+        border = _best_border(kernel, training, measurement)
+        model.bias.fill_(-border / n)
     return model
 
 
-def mean_surroundings(
-    samples: Sequence[VoxelSample], measurement: Measurement, size: KernelSize
-) -> tuple[Tensor, Tensor]:
-    """phi around the mean tower voxel and around the mean other occupied one, (kz, ky, kx) each.
-
-    They lie as a kernel does: the inner product with a kernel is its answer there.
-    """
-    sums = [torch.zeros(size), torch.zeros(size)]
-    counts = [0, 0]
-    for sample in samples:
+def _best_border(
+    kernel: Tensor, training: Sequence[VoxelSample], measurement: Measurement
+) -> float:
+    """The answer at the occupied voxels from which on F0.5 is highest."""
+    answers, towers = [], []
+    for sample in training:
         occupancy, _ = batch([sample], measurement)
-        for i, chosen in enumerate((sample.tower, ~sample.tower)):
-            # The gradient of a sum of answers by the kernel is the sum of what they saw.
-            upstream = torch.zeros(occupancy.n_voxels)
-            upstream[torch.from_numpy(occupancy.index[chosen])] = 1
-            volume = upstream.reshape(len(occupancy), *occupancy.shape)
-            sums[i] += convolution_gradient(occupancy, volume, size)
-            counts[i] += int(chosen.sum())
-    around_tower, around_other = (
-        total / max(count, 1) for total, count in zip(sums, counts, strict=True)
+        answers.append(convolve_at_voxels(occupancy, kernel.detach()[None])[0].numpy())
+        towers.append(sample.tower)
+    answer, tower = np.concatenate(answers), np.concatenate(towers)
+    order = np.argsort(-answer, kind="stable")
+    found = tower[order].cumsum()
+    b2 = BETA**2
+    f05 = (1 + b2) * found / (b2 * tower.sum() + np.arange(1, len(order) + 1))
+    return float(answer[order[int(np.argmax(f05))]])
+
+
+def discriminant(
+    samples: Sequence[VoxelSample], measurement: Measurement, size: KernelSize
+) -> Tensor:
+    """Fisher's linear discriminant of what is around tower voxels and around other occupied ones,
+    (kz, ky, kx): (C + s I)^-1 (m_tower - m_other), with s the mean variance.
+    """
+    every, towers = [], []
+    rows = max(1, MOST_VOXELS // max(1, len(samples)))
+    for sample in samples:
+        # All tower voxels, and of the others evenly as many as there is room for.
+        others = np.flatnonzero(~sample.tower)
+        others = others[:: -(-len(others) // rows)]
+        chosen = np.concatenate([np.flatnonzero(sample.tower), others])
+        every.append(_patches(sample, chosen, measurement, size))
+        towers.append(sample.tower[chosen])
+    seen, tower = np.concatenate(every), np.concatenate(towers)
+    within = np.where(tower[:, None], seen[tower].mean(axis=0), seen[~tower].mean(axis=0))
+    spread = seen - within
+    covariance = spread.T @ spread / len(seen)
+    covariance += np.eye(len(covariance)) * (np.trace(covariance) / len(covariance))
+    apart = seen[tower].mean(axis=0) - seen[~tower].mean(axis=0)
+    return torch.from_numpy(np.linalg.solve(covariance, apart).astype(np.float32)).reshape(size)
+
+
+def _patches(
+    sample: VoxelSample, rows: np.ndarray, measurement: Measurement, size: KernelSize
+) -> np.ndarray:
+    """phi around occupied voxels, (R, kz * ky * kx) float32, as a kernel lies on them."""
+    low = [(k - 1) // 2 for k in size]
+    borders = [(a, k - 1 - a) for a, k in zip(low, size, strict=True)]
+    volume = np.zeros(sample.grid.n_voxels, np.float32)
+    volume[sample.index] = sample.phi(measurement)
+    windows = np.lib.stride_tricks.sliding_window_view(
+        np.pad(volume.reshape(sample.grid.shape), borders), size
     )
-    return around_tower, around_other
+    places = np.unravel_index(sample.index[rows], sample.grid.shape)
+    return windows[places].reshape(len(rows), -1)

@@ -73,7 +73,7 @@ class TrainingSettings(Settings):
     init: Protocol = Field(
         "thesis",
         description="thesis: numbers drawn once; field: the best of many draws on the training "
-        "crops, and for a CNN the mean surroundings of tower voxels less those of others",
+        "crops, and for a CNN what tells the surroundings of tower voxels from those of others",
     )
     epochs: int = Field(50, ge=1, description="passes over the training set")
     batch_size: int = Field(8, ge=1, description="crops a step")

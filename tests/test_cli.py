@@ -40,15 +40,26 @@ def model(survey, tmp_path_factory) -> Path:
     """A model trained on it for a moment, and what was answered on the way."""
     out = tmp_path_factory.mktemp("model") / "model.json"
     made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
-                    "--epochs", 5, "--seeds", 2, "--json")  # fmt: skip
+                    "--seeds", 2, "--json")  # fmt: skip
     assert made.returncode == 0, made.stderr
     answer = json.loads(made.stdout)
-    assert answer["crops"] == {"training": 3, "validation": 1}
+    assert answer["crops"] == {"training": 4, "validation": 0}
+    assert answer["tuned_on"] == "training"
     assert len(answer["seeds"]) == 2
-    assert "epochs" in made.stderr
+    assert "generations" in made.stderr
+    assert json.loads(out.read_text())["units"] == "m"
     made_by = json.loads(out.read_text())["provenance"]
     assert {"seed", "data", "config", "version", "files"} <= made_by.keys()
     return out
+
+
+def test_the_protocol_of_the_thesis_can_be_asked_for(survey, tmp_path):
+    out = tmp_path / "thesis.json"
+    made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
+                    "--protocol", "thesis", "--epochs", 2, "--seeds", 1, "--json")  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    assert json.loads(made.stdout)["crops"] == {"training": 3, "validation": 1}
+    assert json.loads(out.read_text())["units"] == "voxel"
 
 
 def test_every_command_explains_itself():

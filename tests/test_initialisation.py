@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from scenenet.batches import batch
-from scenenet.convolution import convolve
-from scenenet.initialisation import informed_model, mean_surroundings
+from scenenet.convolution import convolve_at_voxels
+from scenenet.initialisation import discriminant, informed_model
 from scenenet.protocol import ModelSettings, TrainingSettings
 from scenenet.training import fit, threshold_curve
 from scenenet.voxels import VoxelGrid, voxelise
@@ -29,19 +29,25 @@ def best(model, samples) -> float:
     return threshold_curve(model, samples, "presence").best()[1].f05
 
 
-def test_surroundings_are_the_mean_of_what_is_around(toys):
-    size = (5, 3, 4)
-    around_tower, around_other = mean_surroundings(toys[:1], "presence", size)
-    occupancy, towers = batch(toys[:1], "presence")
-    kernel = torch.rand(size, generator=torch.Generator().manual_seed(0))
-    answer = convolve(occupancy, kernel).reshape(-1)
-    truth = np.zeros(occupancy.n_voxels, bool)
-    truth[towers] = True
-    occupied = occupancy.flat()
-    expected = answer[occupied[truth[occupied]]].mean()
-    torch.testing.assert_close((kernel * around_tower).sum(), expected)
-    expected = answer[occupied[~truth[occupied]]].mean()
-    torch.testing.assert_close((kernel * around_other).sum(), expected)
+def test_the_discriminant_answers_higher_at_towers_than_a_mean_difference_does(toys):
+    size = (5, 5, 5)
+    kernel = discriminant(toys, "presence", size)
+    assert kernel.shape == size
+
+    def separation(direction: torch.Tensor) -> float:
+        answers, towers = [], []
+        for sample in toys:
+            occupancy, _ = batch([sample], "presence")
+            answers.append(convolve_at_voxels(occupancy, direction[None])[0].numpy())
+            towers.append(sample.tower)
+        answer, tower = np.concatenate(answers), np.concatenate(towers)
+        within = np.where(tower, answer[tower].mean(), answer[~tower].mean())
+        apart = answer[tower].mean() - answer[~tower].mean()
+        return float(apart / (answer - within).std())
+
+    generator = torch.Generator().manual_seed(0)
+    others = [torch.rand(size, generator=generator) - 0.5 for _ in range(20)]
+    assert separation(kernel) > 2 * max(separation(other) for other in others)
 
 
 @pytest.mark.parametrize("seed", range(4))

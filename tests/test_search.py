@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from scenenet.geneo import kernel_named
 from scenenet.metrics import THRESHOLDS, ThresholdCurve, confusion
 from scenenet.models import SceneNet
 from scenenet.protocol import FieldSettings
@@ -89,8 +90,10 @@ def test_draws_cover_the_ranges_and_all_mixtures():
     for row in numbers:
         net.set_numbers(row)
         seen.append(net.shape_parameters())
+    low, high = kernel_named("cylinder").parameters[0].metric_range
     radius = [s["cylinder.r"] for s in seen]
-    assert min(radius) < 0.15 and max(radius) > 1.6
+    assert low < min(radius) < 1.2 * low
+    assert 0.9 * high < max(radius) < high
     for name in net.names:
         weight = [s[f"lambda.{name}"] for s in seen]
         assert min(weight) < 0.05 and max(weight) > 0.8

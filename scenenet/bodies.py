@@ -16,8 +16,11 @@ SLIM_M = 2.0
 """m; but the body of a low tower is looked for this far from the axis, which is known to a voxel or
 two."""
 
-TOP_GAP = 2.0
-"""m of nothing above the highest detected voxel that end a tower: a bird is not its top."""
+TOP_GAP = 3.0
+"""m of nothing that end a tower upwards: a bird above it is not its top."""
+
+STRAY_GAP = 10.0
+"""m between detected voxels that end it too: a stray return high above can look like a pole."""
 
 MIDDLE = 0.3, 0.9
 """Parts of the height between which a body stands free: below are shrubs and its legs."""
@@ -60,21 +63,27 @@ def standing(
     elevations = np.append(around[distance <= foot_radius, 2], seen.min())
     # Not the lowest: a return from below the ground must not make a tower of a bush.
     lowest = float(np.percentile(elevations, 5))
-    height = seen.max() - lowest
+    detected = np.unique(np.rint((seen - seen.min()) / voxel_size).astype(int))
+    midst = int((np.median(seen) - seen.min()) / voxel_size)
+    head = _unbroken(detected, midst, STRAY_GAP / voxel_size)
+    height = seen.min() + head * voxel_size - lowest
     slim = max(SLIM_M, SLIM * height)
     legs = around[:, 2] - lowest < MIDDLE[0] * height
     near = distance <= np.where(legs, 2 * slim, slim)
     # Levels are counted from the lowest one that is surely on the lattice.
     levels = np.unique(np.rint((around[near, 2] - seen.min()) / voxel_size).astype(int))
     foot = round((lowest - seen.min()) / voxel_size)
-    top = round((seen.max() - seen.min()) / voxel_size)
-    above = levels[levels >= top]
-    if len(above):
-        gaps = np.flatnonzero(np.diff(above) * voxel_size > TOP_GAP)
-        top = int(above[gaps[0]] if len(gaps) else above[-1])
+    top = _unbroken(np.union1d(levels, detected[detected <= head]), midst, TOP_GAP / voxel_size)
     upright = ((levels >= foot) & (levels <= top)).sum() / (top - foot + 1)
     base = lowest - voxel_size / 2
     return Body(base, float(seen.min() + (top + 0.5) * voxel_size - base), float(upright))
+
+
+def _unbroken(levels: np.ndarray, start: int, gap: float) -> int:
+    """The last of ascending levels (N,) that is reached from ``start`` without a wider ``gap``."""
+    above = np.append(start, levels[levels > start])
+    breaks = np.flatnonzero(np.diff(above) > gap)
+    return int(above[breaks[0]] if len(breaks) else above[-1])
 
 
 def middle(

@@ -22,10 +22,10 @@ def extremes(xyz):  # pragma: no cover - compiled
     return np.array([low_x, low_y, low_z]), np.array([high_x, high_y, high_z])
 
 
-@numba.njit(**COMPILED)
+@numba.njit(parallel=True, **COMPILED)
 def voxel_of(xyz, origin, voxel_size, nz, ny, nx):  # pragma: no cover - compiled
     voxel = np.empty(len(xyz), np.int64)
-    for i in range(len(xyz)):
+    for i in numba.prange(len(xyz)):
         x = min(nx - 1, max(0, math.floor((xyz[i, 0] - origin[0]) / voxel_size)))
         y = min(ny - 1, max(0, math.floor((xyz[i, 1] - origin[1]) / voxel_size)))
         z = min(nz - 1, max(0, math.floor((xyz[i, 2] - origin[2]) / voxel_size)))

@@ -108,7 +108,7 @@ class BlackBox:
 
         As ``scenenet.training.probabilities`` has it for the other models.
         """
-        return _spread(sample, self.of_occupied(sample))
+        return sample.spread(self.of_occupied(sample))
 
     def n_parameters(self) -> int:
         """Learnt numbers: feature and threshold of each split, the value of each leaf."""
@@ -184,7 +184,7 @@ def fit_and_tune(
     for out, sample in enumerate(training):
         others = [i for i in range(len(training)) if i != out]
         model = _fit([features[i] for i in others], [towers[i] for i in others], settings, seed)
-        curve += ThresholdCurve.of(*_spread(sample, model.of_features(features[out])))
+        curve += ThresholdCurve.of(*sample.spread(model.of_features(features[out])))
     model = _fit(features, towers, settings, seed, provenance)
     return replace(model, tau=curve.best()[0]), curve
 
@@ -293,15 +293,6 @@ def _trees_of(grown: Any) -> Trees:
         np.where(leaf, 0, every["right"] + shift).astype(np.int32),
         np.where(leaf, every["value"], 0.0),
     )
-
-
-def _spread(sample: VoxelSample, occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Probability and truth of every voxel from the probability of the occupied ones."""
-    probability = np.zeros(sample.grid.n_voxels, np.float32)
-    probability[sample.index] = occupied
-    truth = np.zeros(sample.grid.n_voxels, bool)
-    truth[sample.tower_index()] = True
-    return probability, truth
 
 
 def _check_head(head: Any) -> None:

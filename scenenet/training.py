@@ -181,21 +181,12 @@ def probabilities(
     if isinstance(model, SceneNet) and model.field is not None:
         (scene,) = scenes_of(model, [sample], measurement)
         with torch.no_grad():
-            return _spread(sample, answers(model, scene))
+            return sample.spread(answers(model, scene))
     occupancy, towers = batch([sample], measurement)
     with torch.no_grad():
         probability = model(occupancy).numpy().reshape(-1)
     truth = np.zeros(len(probability), bool)
     truth[towers] = True
-    return probability, truth
-
-
-def _spread(sample: VoxelSample, occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Probability and truth of every voxel from the probability (M,) of the occupied ones."""
-    probability = np.zeros(sample.grid.n_voxels, np.float32)
-    probability[sample.index] = occupied
-    truth = np.zeros(sample.grid.n_voxels, bool)
-    truth[sample.tower_index()] = True
     return probability, truth
 
 

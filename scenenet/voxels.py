@@ -137,6 +137,15 @@ class VoxelSample:
             return np.ones(len(self.index), np.float32)
         return (self.count / self.count.max()).astype(np.float32)
 
+    def spread(self, occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Probability (V,) float32 and truth (V,) bool of every voxel of the grid, from the
+        probability (M,) of the occupied ones; that of the others is 0."""
+        probability = np.zeros(self.grid.n_voxels, np.float32)
+        probability[self.index] = occupied
+        truth = np.zeros(self.grid.n_voxels, bool)
+        truth[self.tower_index()] = True
+        return probability, truth
+
     def tower_index(self) -> np.ndarray:
         """(T,) flat positions of the tower voxels."""
         return self.index[self.tower]

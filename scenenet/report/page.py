@@ -10,27 +10,34 @@ from pathlib import Path
 from scenenet.errors import InputError
 from scenenet.files import write_text
 from scenenet.published import Thesis
-from scenenet.report import sections, study_sections, survey_sections
+from scenenet.report import (
+    crop_sections,
+    data_sections,
+    model_sections,
+    overview,
+    study_sections,
+    survey_sections,
+)
 from scenenet.report.blocks import Section
-from scenenet.report.sections import Material, SectionMaker
+from scenenet.report.material import Material, SectionMaker
 from scenenet.results import Results
 
 TITLE = "Towers of power lines, found by SCENE-Net"
 HERE = Path(__file__).parent
 
 SECTIONS: Sequence[SectionMaker] = (
-    sections.overview,
-    sections.models,
-    sections.positions,
-    sections.learned,
-    sections.crops,
+    overview.overview,
+    model_sections.models,
+    model_sections.positions,
+    model_sections.learned,
+    crop_sections.crops,
     study_sections.studies,
     study_sections.thesis_and_ours,
     survey_sections.predictions,
-    sections.data,
-    sections.towers,
-    sections.voxels,
-    sections.training,
+    data_sections.data,
+    data_sections.towers,
+    data_sections.voxels,
+    model_sections.training,
     survey_sections.provenance,
 )
 """In the order of the page. A section that has nothing to show is left out."""

@@ -11,7 +11,7 @@ from scenenet.comparison import (
     UNMEASURED,
 )
 from scenenet.report.blocks import Block, Column, Facts, Figure, Heading, Section, Text, table
-from scenenet.report.sections import VOXEL_SCORES, Material, beside
+from scenenet.report.material import VOXEL_SCORES, Material, beside
 
 VERDICTS = (REPRODUCED, BETTER, NOT, UNMEASURED)
 

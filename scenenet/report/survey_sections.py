@@ -20,7 +20,7 @@ from scenenet.report.blocks import (
     table,
     write,
 )
-from scenenet.report.sections import Material
+from scenenet.report.material import Material
 
 TOWERS_LISTED = 300
 """A longer list is no longer read on a page; the GeoJSON has all of them."""

@@ -1,0 +1,105 @@
+"""The sections on the models: scores, towers found, parameters, training (thesis 5.2)."""
+
+from __future__ import annotations
+
+from scenenet.report.blocks import Block, Column, Section, Text, table
+from scenenet.report.material import VOXEL_SCORES, Material, beside
+from scenenet.tables import TRIVIAL
+
+
+def models(material: Material) -> Section | None:
+    """Table 5.3 and Figure 5.7."""
+    frame = material.table("models")
+    if frame is None:
+        return None
+    columns = [
+        Column("model", "model"),
+        Column("counted", "counted"),
+        Column("parameters", "parameters", "count"),
+        *beside(VOXEL_SCORES),
+    ]
+    caption = (
+        "Scores of the tower class over all voxels of the test crops at the tau chosen on "
+        "validation, mean ± standard deviation over seeds, beside thesis Table 5.3. IoU mean is "
+        "over background and tower, as the thesis' IoU. The thesis "
+        "counts useful trainings only and was measured on other data, so the columns can be "
+        "compared in kind, not digit by digit. "
+        f"“{TRIVIAL}” is a model that never says tower."
+    )
+    seeds = material.table("seeds")
+    blocks: list[Block] = [table(frame, columns, caption, "tables/models.csv")]
+    blocks += material.figures("models")
+    if seeds is not None:
+        columns = [
+            Column("model", "model"),
+            Column("seed", "seed", "count"),
+            Column("alive", "detects anything", "yes"),
+            Column("tau", "tau", "score"),
+            Column("validation_f05", "F0.5 on validation", "score"),
+            *(Column(c.name, c.label, "score") for c in VOXEL_SCORES),
+            Column("average_precision", "area below P-R", "score"),
+        ]
+        caption = "Every training by itself: scores on the test crops, tau from validation."
+        blocks.append(table(seeds, columns, caption, "tables/seeds.csv", folded=True))
+    return Section("models", "The models side by side", blocks)
+
+
+def positions(material: Material) -> Section | None:
+    """Tower positions in metres (thesis 5.2.4)."""
+    frame = material.table("tower_scores")
+    if frame is None:
+        return None
+    columns = [
+        Column("model", "model"),
+        Column("counted", "counted"),
+        Column("precision", "precision", "score2", "precision_std"),
+        Column("recall", "recall", "score2", "recall_std"),
+        Column("median_error_m", "median error [m]", "metres", "median_error_m_std"),
+        Column("n_true", "true towers", "count"),
+        Column("n_predicted", "predicted towers", "number", "n_predicted_std"),
+    ]
+    caption = (
+        "Towers as a whole on the test crops: a predicted one within 5 m of a true one is a hit. "
+        "Every crop has a tower in its middle, which is easier than a whole survey. The thesis "
+        "gives no such numbers."
+    )
+    found = table(frame, columns, caption, "tables/tower_scores.csv")
+    return Section("positions", "Towers found", [found])
+
+
+def learned(material: Material) -> Section | None:
+    """Figures 4.2-4.4 and 5.5."""
+    blocks = material.figures("learned")
+    if not blocks:
+        return None
+    share = material.thesis.value("parameters.lambda_negative_sphere")
+    if share is not None:
+        blocks.append(
+            Text(
+                f"In the thesis' model the negative sphere has a mixing weight of {share:g} % "
+                "(5.2.2). Weights of different runs are comparable only as far as the kernels have "
+                "values of the same size."
+            )
+        )
+    return Section("learned", "What was learned", blocks)
+
+
+def training(material: Material) -> Section | None:
+    """Training curves and times (thesis 5.2.6)."""
+    blocks = material.figures("training")
+    frame = material.table("times")
+    if frame is not None:
+        columns = [
+            Column("model", "model"),
+            Column("n_seeds", "trainings", "count"),
+            Column("epochs", "epochs", "count"),
+            Column("training_seconds", "one training", "seconds", "training_seconds_std"),
+            Column("seconds_per_epoch", "one epoch", "seconds"),
+            Column("thesis_training_seconds", "thesis, one training", "seconds", published=True),
+        ]
+        caption = (
+            "Training time of one seed. The thesis trained on an NVIDIA GeForce RTX 3070 with far "
+            "more crops; ours is the machine this ran on."
+        )
+        blocks = [table(frame, columns, caption, "tables/times.csv"), *blocks]
+    return Section("training", "Training", blocks) if blocks else None

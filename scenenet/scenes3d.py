@@ -37,7 +37,7 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
 
     from scenenet.batches import batch
     from scenenet.convolution import convolve_at_voxels
-    from scenenet.figures.drawings import champion_of, class_groups, crop_cloud, ranked
+    from scenenet.figures.chosen import champion_of, class_groups, crop_cloud, ranked
     from scenenet.metrics import THRESHOLDS, ThresholdCurve
     from scenenet.modelfile import read_model
     from scenenet.models import SceneNet

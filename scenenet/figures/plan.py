@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scenenet.errors import InputError
-from scenenet.figures import drawings
+from scenenet.figures import crop_drawings, data_drawings, model_drawings
 from scenenet.files import read_json, write_json
 from scenenet.published import Thesis
 from scenenet.results import Results
@@ -79,45 +79,45 @@ def plan(
     planned: list[Drawing] = []
     for survey, (path, codes) in (sources or {}).items():
         if Path(path).suffix.lower() in (".las", ".laz"):
-            draw = _bind(drawings.draw_clusters, results, survey, path, codes)
+            draw = _bind(data_drawings.draw_clusters, results, survey, path, codes)
             title = f"Towers of {survey} told apart"
             planned.append(Drawing(f"clusters-{survey}", title, "towers", draw, survey=survey))
     if results.surveys:
-        draw = _bind(drawings.draw_surveys, results)
+        draw = _bind(data_drawings.draw_surveys, results)
         planned.append(Drawing("surveys", "A crop of each survey, at one scale", "data", draw))
     models = tuple(results.models)
     reference = _reference(results)
     if reference is not None:
-        draw = _bind(drawings.draw_grids, results, reference)
+        draw = _bind(data_drawings.draw_grids, results, reference)
         planned.append(Drawing("voxels", "One crop on three grids", "voxels", draw))
-        draw = _bind(drawings.draw_curves, results, thesis)
+        draw = _bind(model_drawings.draw_curves, results, thesis)
         title = "Precision against recall"
         planned.append(Drawing("precision-recall", title, "models", draw, models))
     for model, kind in results.models.items():
         shown = (model,)
-        draw = _bind(drawings.draw_training, results, model)
+        draw = _bind(model_drawings.draw_training, results, model)
         planned.append(Drawing(f"training-{model}", f"Training {model}", "training", draw, shown))
-        draw = _bind(drawings.draw_kernels, results, model)
+        draw = _bind(model_drawings.draw_kernels, results, model)
         title = f"The kernels of {model}"
         planned.append(Drawing(f"kernels-{model}", title, "learned", draw, shown))
         if kind == "scenenet":
-            draw = _bind(drawings.draw_parameters, results, model)
+            draw = _bind(model_drawings.draw_parameters, results, model)
             title = f"What {model} has learned"
             planned.append(Drawing(f"parameters-{model}", title, "learned", draw, shown))
-            draw = _bind(drawings.draw_paths, results, model)
+            draw = _bind(model_drawings.draw_paths, results, model)
             title = f"How each parameter of {model} moved"
             planned.append(Drawing(f"paths-{model}", title, "training", draw, shown))
     if reference is not None:
         for rank in CROP_RANKS:
-            draw = _bind(drawings.draw_crop, results, reference, rank)
+            draw = _bind(crop_drawings.draw_crop, results, reference, rank)
             title = f"The {rank} test crop"
             planned.append(Drawing(f"crop-{rank}", title, "crops", draw, models))
     for survey in results.predicted:
-        draw = _bind(drawings.draw_prediction, results, survey)
+        draw = _bind(crop_drawings.draw_prediction, results, survey)
         name = f"prediction-{survey}"
         planned.append(Drawing(name, f"{survey} classified", "predictions", draw, survey=survey))
     for study in results.studies:
-        draw = _bind(drawings.draw_study, results, study, thesis)
+        draw = _bind(model_drawings.draw_study, results, study, thesis)
         planned.append(Drawing(f"study-{study.name}", study.title, "studies", draw))
     return planned
 

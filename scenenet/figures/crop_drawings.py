@@ -1,0 +1,99 @@
+"""Pictures of answers: single test crops and classified surveys (thesis Figures 5.8 and 5.9).
+
+Every function that draws writes one PNG and returns (alternative text, caption).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenenet.errors import InputError
+from scenenet.figures.chosen import (
+    POINTS_PER_PICTURE,
+    champion_of,
+    class_groups,
+    crop_cloud,
+    ranked,
+    thinned,
+)
+from scenenet.results import Results, SeedResult
+
+if TYPE_CHECKING:
+    from scenenet.figures.scenes import View
+    from scenenet.pointcloud import PointCloud
+
+
+def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[str, str]:
+    from scenenet.figures.scenes import View, side_views
+
+    chosen_by = champion_of(results, reference)
+    sample = ranked(chosen_by, rank)
+    cloud = crop_cloud(results, sample)
+    views = [View("labels", class_groups(cloud), "class")]
+    views += [_probability(cloud, champion_of(results, model)) for model in results.models]
+    keep = thinned(len(cloud))
+    shown = [replace(view, values=view.values[keep]) for view in views]
+    return side_views(cloud.xyz[keep], shown, out), (
+        f"Crop {sample['id']}: the {rank} of {len(chosen_by.evaluation['per_sample'])} test crops "
+        f"by F0.5 of {reference} (here {sample['f05']:.2f}, precision {sample['precision']:.2f}, "
+        f"recall {sample['recall']:.2f}). Points take the probability of their voxel; each model "
+        "is the seed that is best on validation. As thesis Figures 5.8 and 5.9."
+    )
+
+
+def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]:
+    from scenenet.figures.scenes import survey_overview
+
+    found = results.prediction(survey)
+    if found is None:
+        raise InputError("was not predicted", file=results.folder / "predict" / survey)
+    _, geojson = found
+    towers = [
+        (*feature["geometry"]["coordinates"][:2], feature["properties"]["base_elevation"])
+        for feature in geojson["features"]
+    ]
+    xyz, probability = _classified_points(results.folder / "predict" / survey / f"{survey}.laz")
+    alt = survey_overview(xyz, probability, np.asarray(towers, float).reshape(-1, 3), out)
+    return alt, (
+        f"{survey} from above and from the side, along its main direction. Colour is the tower "
+        "probability of each point (every point that is likely a tower is drawn, the others are "
+        "thinned); red marks are the detected towers, numbered as in the list."
+    )
+
+
+def _probability(cloud: PointCloud, champion: SeedResult) -> View:
+    """The answer of a model to a crop, on the grid it was trained on."""
+    import torch
+
+    from scenenet.batches import batch
+    from scenenet.figures.scenes import View
+    from scenenet.modelfile import read_model
+    from scenenet.voxels import VoxelSettings, voxelise
+
+    model, card = read_model(champion.model_files[0])
+    settings = VoxelSettings(fit=card.fit, resolution=card.resolution, voxel_size=card.voxel_size)
+    grid = settings.grid(cloud.xyz)
+    occupancy, _ = batch([voxelise(cloud, grid)], card.measurement)
+    with torch.no_grad():
+        volume = model.at(grid.voxel_size)(occupancy)[0].numpy().reshape(-1)
+    return View(champion.model, volume[grid.voxel_of(cloud.xyz)], "probability")
+
+
+def _classified_points(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) m and (N,) probability of a classified survey, thinned for drawing."""
+    import laspy
+
+    positions, probabilities = [], []
+    with laspy.open(path) as reader:
+        step = max(1, reader.header.point_count // POINTS_PER_PICTURE)
+        for chunk in reader.chunk_iterator(1_000_000):
+            probability = np.asarray(chunk["tower_probability"], float)
+            keep = probability >= 0.5
+            keep[::step] = True
+            positions.append(np.stack([chunk.x, chunk.y, chunk.z], axis=1)[keep])
+            probabilities.append(probability[keep])
+    return np.concatenate(positions), np.concatenate(probabilities)

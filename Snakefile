@@ -9,6 +9,9 @@ configfile: "config/studies.yaml"
 configfile: "config/config.yaml"
 
 
+report: "workflow/report/workflow.rst"
+
+
 include: "workflow/rules/common.smk"
 include: "workflow/rules/surveys.smk"
 include: "workflow/rules/dataset.smk"

@@ -107,3 +107,4 @@ def champion_file(model):
 
 
 include: "gathered.smk"
+include: "shown.smk"

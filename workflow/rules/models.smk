@@ -93,7 +93,7 @@ rule champion:
         models=lambda w: [tuned_file(w.model, seed) for seed in settings.seeds],
         tunings=lambda w: [f"{R}/tune/{w.model}/seed-{seed}.json" for seed in settings.seeds],
     output:
-        model=f"{R}/models/{{model}}.json",
+        model=shown_model(f"{R}/models/{{model}}.json"),
         provenance=f"{R}/models/{{model}}.provenance.json",
     log:
         f"{R}/logs/champion/{{model}}.log",
@@ -115,7 +115,7 @@ rule champion:
 
 use rule champion as champion_cnn with:
     output:
-        model=f"{R}/models/{{model}}.safetensors",
+        model=shown_model(f"{R}/models/{{model}}.safetensors"),
         provenance=f"{R}/models/{{model}}.provenance.json",
     wildcard_constraints:
         model=any_of(models_of("cnn")),

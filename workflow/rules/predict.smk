@@ -7,8 +7,20 @@ rule predict:
         model=champion_file(settings.predict.model),
     output:
         survey=f"{R}/predict/{{survey}}/{{survey}}.laz",
-        towers=f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
-        summary=f"{R}/predict/{{survey}}/{{survey}}.summary.json",
+        towers=shown(
+            f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
+            "prediction-towers",
+            "predictions",
+            "Files",
+            {"survey": "{survey}", "file": "Towers"},
+        ),
+        summary=shown(
+            f"{R}/predict/{{survey}}/{{survey}}.summary.json",
+            "prediction-summary",
+            "predictions",
+            "Files",
+            {"survey": "{survey}", "file": "Summary"},
+        ),
         provenance=f"{R}/predict/{{survey}}/provenance.json",
     log:
         f"{R}/logs/predict/{{survey}}.log",

@@ -3,7 +3,7 @@
 
 rule resolved_config:
     output:
-        config=f"{R}/config.yaml",
+        config=shown(f"{R}/config.yaml", "settings", "record", "Files", {"file": "All settings"}),
     log:
         f"{R}/logs/resolved_config.log",
     benchmark:
@@ -32,8 +32,8 @@ rule tables:
         black_box=BLACK_BOX,
         thesis=ancient(settings.thesis),
     output:
-        tables=TABLES,
-        comparison=COMPARISON,
+        tables=shown_tables(TABLES),
+        comparison=shown_table(COMPARISON),
         provenance=f"{R}/tables/provenance.json",
     log:
         f"{R}/logs/tables.log",
@@ -60,7 +60,7 @@ rule figures:
         scores=SCORES,
         thesis=ancient(settings.thesis),
     output:
-        **pictures(FIGURES),
+        **shown_pictures(_planned),
         provenance=f"{R}/figures/provenance.json",
     log:
         f"{R}/logs/figures.log",
@@ -90,7 +90,7 @@ rule tower_map:
         survey=lambda w: source(w.survey),
         towers=f"{R}/towers/{{survey}}/towers.csv",
     output:
-        **pictures(["clusters-{survey}"]),
+        **shown_picture("clusters", "towers", {"figure": "Towers of {survey} told apart"}),
         provenance=f"{R}/figures/clusters-{{survey}}.provenance.json",
     log:
         f"{R}/logs/tower_map/{{survey}}.log",
@@ -121,7 +121,7 @@ rule prediction_map:
         towers=f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
         summary=f"{R}/predict/{{survey}}/{{survey}}.summary.json",
     output:
-        **pictures(["prediction-{survey}"]),
+        **shown_picture("prediction", "predictions", {"figure": "{survey} classified"}),
         provenance=f"{R}/figures/prediction-{{survey}}.provenance.json",
     log:
         f"{R}/logs/prediction_map/{{survey}}.log",
@@ -150,7 +150,9 @@ rule study_figure:
         runs=f"{R}/studies/{{study}}/runs.csv",
         thesis=ancient(settings.thesis),
     output:
-        **pictures(["study-{study}"]),
+        **shown_picture(
+            "study", "studies", lambda w: {"study": w.study, "asks": title_of_study(w.study)}
+        ),
         provenance=f"{R}/figures/study-{{study}}.provenance.json",
     log:
         f"{R}/logs/study_figure/{{study}}.log",
@@ -223,7 +225,7 @@ rule report:
         records=RECORDS,
         thesis=ancient(settings.thesis),
     output:
-        report=f"{R}/report/index.html",
+        report=shown(f"{R}/report/index.html", "page", "page", "Files", {"file": "The page, whole"}),
         provenance=f"{R}/report/provenance.json",
     log:
         f"{R}/logs/report.log",

@@ -6,7 +6,13 @@ rule study:
         stores=CROP_STORES,
         manifests=CROP_MANIFESTS,
     output:
-        runs=f"{R}/studies/{{study}}/runs.csv",
+        runs=shown(
+            f"{R}/studies/{{study}}/runs.csv",
+            "study-runs",
+            "studies",
+            "Trainings",
+            lambda w: {"study": w.study, "asks": title_of_study(w.study)},
+        ),
         provenance=f"{R}/studies/{{study}}/provenance.json",
     log:
         f"{R}/logs/study/{{study}}.log",

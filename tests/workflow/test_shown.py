@@ -1,0 +1,90 @@
+"""``snakemake --report``: every table and figure, with what a reader needs to understand it."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.workflow
+
+NOWHERE = "http://127.0.0.1:9"
+"""A proxy at which nobody answers: whatever asks the network for something fails."""
+
+
+@pytest.fixture
+def shown(project, tmp_path, monkeypatch) -> dict[str, dict]:
+    """Path of a result -> what the report has of it, category and subcategory included."""
+    for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"):
+        monkeypatch.setenv(name, NOWHERE)
+    monkeypatch.setenv("no_proxy", "")
+    project.run("--report", str(tmp_path / "out.html"))
+    html = (tmp_path / "out.html").read_text(encoding="utf-8")
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']http", html)
+    results = _variable(html, "results")
+    for category, groups in _variable(html, "categories").items():
+        for group, paths in groups.items():
+            for path in paths:
+                results[path] |= {"category": category, "group": group}
+    return results
+
+
+def _variable(html: str, name: str) -> dict:
+    begin = re.search(rf'<script id="{name}">\s*var {name} = ', html)
+    return json.JSONDecoder().raw_decode(html, begin.end())[0]
+
+
+def test_the_report_has_everything_with_words_for_it_and_changes_nothing(project, shown):
+    made = [
+        *project.results.glob("tables/*.csv"),
+        *project.results.glob("figures/*.png"),
+        *project.results.glob("studies/*/runs.csv"),
+        *project.results.glob("predict/*/*.towers.geojson"),
+        project.results / "report/index.html",
+        project.results / "models/scenenet.json",
+        project.results / "config.yaml",
+    ]
+    assert len(made) > 25
+    missing = {str(path.relative_to(project.folder)) for path in made} - set(shown)
+    assert missing == set()
+    for path, entry in shown.items():
+        said = re.sub(r"<[^>]+>", "", entry["caption"])
+        assert len(said) > 40, path
+        assert "{" not in said and "Undefined" not in said, path
+        assert entry["category"] in {
+            "1 Page", "2 Models", "3 New surveys", "4 Studies", "5 Data", "6 How it was made"
+        }, path  # fmt: skip
+        assert entry["labels"], path
+        assert entry["data_uri"].startswith("data:"), path
+    # Two with the same labels in one place would be one row, and one of them could not be opened.
+    rows = [(e["category"], e["group"], *e["labels"].values()) for e in shown.values()]
+    assert len(rows) == len(set(rows))
+    assert project.planned() == {}
+
+
+def test_captions_speak_of_their_own_result(shown):
+    assert "own" in shown["results/figures/prediction-own.png"]["caption"]
+    assert "ablations" in shown["results/figures/study-ablations.png"]["caption"]
+    assert "0, 1" in shown["results/tables/models.csv"]["caption"]
+    assert shown["results/figures/training-cnn.png"]["labels"] == {"figure": "Training cnn"}
+    assert shown["results/tables/study-ablations.csv"]["labels"]["asks"] == (
+        "Which operators does it need?"
+    )
+
+
+def test_another_caption_reruns_nothing(project):
+    project.edit("workflow/report/figure-crop.rst", "A test crop", "One of the test crops")
+    project.edit("workflow/rules/shown.smk", '"Towers found"', '"Found towers"')
+    assert project.planned() == {}
+
+
+def test_every_caption_is_of_something(project_root: Path):
+    rules = "".join(p.read_text() for p in (project_root / "workflow/rules").glob("*.smk"))
+    for caption in (project_root / "workflow/report").glob("*.rst"):
+        kind = caption.stem.removeprefix("figure-").removeprefix("table-")
+        named = kind in rules or caption.stem == "workflow"
+        drawn = f'"{kind}' in (project_root / "scenenet/figures/plan.py").read_text()
+        tabled = f'"{kind}"' in (project_root / "scenenet/tables.py").read_text()
+        assert named or drawn or tabled, caption.name

@@ -357,16 +357,18 @@ def _training_lines(result: dict[str, Any]) -> list[str]:
 
 def _score_lines(result: dict[str, Any]) -> list[str]:
     def row(name: str, scores: dict[str, float]) -> str:
-        return f"{name:<22}" + "".join(
+        return f"{name:<24}" + "".join(
             f"{scores[key]:>10.3f}" for key in ("precision", "recall", "f05", "iou_tower", "miou")
         )
 
     towers = result["towers"]
     error = towers["median_error_m"]
     return [
-        f"{'':<22}" + "".join(f"{n:>10}" for n in ("P", "R", "F0.5", "tower IoU", "macro IoU")),
+        f"{'':<24}" + "".join(f"{n:>10}" for n in ("P", "R", "F0.5", "tower IoU", "macro IoU")),
         row(result["model"], result["voxel"]),
         row("  occupied voxels only", result["voxel_occupied"]),
+        row("  voxels that reach tau", result["voxel_observer"]),
+        row("  whole towers", result["voxel_towers"]),
         row("predicting nothing", result["voxel_trivial"]),
         f"{result['voxel']['n_samples']} crops, tau {result['voxel']['tau']:.3f}",
         f"towers: {towers['n_predicted']} found, {towers['n_true']} true, "

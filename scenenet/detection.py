@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
-from scenenet.bodies import middle, standing
+from scenenet.bodies import middle, of_body, standing
 from scenenet.settings import Settings
 from scenenet.wires import FAR, SCALES, Span, leaving_spans
 
@@ -78,6 +78,19 @@ class DetectionSettings(Settings):
         "tree under a line has its crown",
     )
 
+    body: float = Field(
+        2.1,
+        gt=0,
+        description="m about the axis, half the mean width of a tower (thesis 5.1.2): whatever "
+        "stands there is the tower, detected or not",
+    )
+    beside_body: float = Field(
+        1.0, ge=0, description="m that this goes beyond half the measured width of a wider tower"
+    )
+    foot: float = Field(
+        1.0, ge=0, description="m above the ground; below are the ground and what grows on it"
+    )
+
     def threshold(self, tau: float) -> float:
         """Probability from which voxels are looked at, where tau makes one a tower's."""
         return tau if tau >= 1 else math.tanh(self.look * math.atanh(tau))
@@ -92,10 +105,11 @@ class DetectedTower:
         base: m, elevation of the ground at its foot.
         height: m, from there to its top.
         width: m, of its body where it stands free.
+        free: share of its body that stands free.
         upright: share of the levels from foot to top at which something stands.
         spans: directions in which wires leave, the longest first.
         probability: highest probability among its voxels.
-        voxels: positions of its voxels in what was passed to ``detect_towers``.
+        voxels: positions of its detected voxels in what was passed to ``detect_towers``.
     """
 
     x: float
@@ -103,6 +117,7 @@ class DetectedTower:
     base: float
     height: float
     width: float
+    free: float
     upright: float
     spans: tuple[Span, ...]
     probability: float
@@ -155,6 +170,17 @@ def detect_towers(
         for tower in _one_of_each(found, detected, settings)
     ]
     return sorted(towers, key=lambda t: (-t.probability, t.x, t.y))
+
+
+def whole_tower(
+    tower: DetectedTower, occupied: np.ndarray, settings: DetectionSettings
+) -> np.ndarray:
+    """Which occupied voxels (M, 3) m are of a tower's body, detected or not: (M,) bool.
+
+    What reaches tau beside the body, at crossarms, is the tower's as well: see
+    ``DetectedTower.voxels``.
+    """
+    return of_body(occupied, tower, settings.body, settings.beside_body, settings.foot)
 
 
 def among(places: np.ndarray) -> Surroundings:
@@ -267,7 +293,7 @@ def _measure(
     if followed < settings.min_wire * (1 if peak >= tau else 2):
         return None
     return DetectedTower(
-        x, y, body.base, body.height, width, body.upright, tuple(spans), peak, seen
+        x, y, body.base, body.height, width, free, body.upright, tuple(spans), peak, seen
     )
 
 
@@ -276,12 +302,16 @@ def _one_of_each(
 ) -> list[DetectedTower]:
     """Towers with the voxels that are theirs.
 
-    One tower may have several axes, at its legs or on a crossarm. That on which most stands is its
-    own.
+    One tower may have several axes, at its legs or on a crossarm. That on which most stands, and
+    stands free, is its own.
     """
     towers: list[DetectedTower] = []
     taken = np.zeros(len(detected.centres), bool)
-    for tower in sorted(found, key=lambda t: (-t.upright * t.height, -t.probability, t.x, t.y)):
+
+    def stands(tower: DetectedTower) -> float:
+        return tower.free * tower.upright * tower.height
+
+    for tower in sorted(found, key=lambda t: (-stands(t), -t.probability, t.x, t.y)):
         if any(
             np.hypot(tower.x - t.x, tower.y - t.y) <= max(settings.eps, APART * t.height)
             for t in towers

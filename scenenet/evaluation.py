@@ -9,10 +9,16 @@ from typing import Any
 import numpy as np
 
 from scenenet.crops import Crop
-from scenenet.detection import DetectionSettings, among, detect_towers
+from scenenet.detection import (
+    DetectedTower,
+    DetectionSettings,
+    among,
+    detect_towers,
+    whole_tower,
+)
 from scenenet.metrics import Confusion, ThresholdCurve, TowerMatch, confusion, match_towers
 from scenenet.modelfile import ModelCard, read_model
-from scenenet.models import VoxelModel
+from scenenet.models import SceneNet, VoxelModel
 from scenenet.progress import track
 from scenenet.split import crops_in
 from scenenet.training import probabilities
@@ -43,7 +49,10 @@ def score(
     def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         return probabilities(model, sample, card.measurement)
 
-    return score_answers(card.name, seed, card.threshold(), answer, dataset, detection)
+    whole = isinstance(model, SceneNet) and model.field is not None and model.field.whole_towers
+    return score_answers(
+        card.name, seed, card.threshold(), answer, dataset, detection, whole_towers=whole
+    )
 
 
 def score_answers(
@@ -53,33 +62,43 @@ def score_answers(
     answer: Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]],
     dataset: Dataset,
     detection: DetectionSettings,
+    *,
+    whole_towers: bool = False,
 ) -> dict[str, Any]:
     """Voxel and tower scores at tau over all samples, of whatever answers them.
 
     Voxel scores come from the counts of all samples together, and all voxels of the grids count,
-    empty ones included. ``voxel_occupied`` counts the occupied voxels alone, ``voxel_trivial`` is
-    the model that never says tower, and ``alive`` says whether the model found any tower voxel.
+    empty ones included. ``voxel_observer`` counts the voxels that reach tau, ``voxel_towers`` those
+    of the towers found, body and all (docs/towers.md), and ``voxel`` is one of the two.
+    ``voxel_occupied`` is ``voxel`` over the occupied voxels alone, ``voxel_trivial`` the model that
+    never says tower, and ``alive`` says whether any tower voxel reaches tau.
 
     Args:
         name, seed: of the model.
         answer: probability (V,) and truth (V,) bool of every voxel of a sample's grid.
+        whole_towers: whether ``voxel`` and ``per_sample`` are of whole towers.
 
     Returns:
-        model, seed, alive, voxel, voxel_trivial, voxel_occupied, towers, per_sample, pr_curve and
-        average_precision, all of plain numbers.
+        model, seed, alive, whole_towers, voxel, voxel_observer, voxel_towers, voxel_trivial,
+        voxel_occupied, towers, per_sample, pr_curve and average_precision, all of plain numbers.
     """
-    every, occupied = Confusion(), Confusion()
+    reached, whole, occupied = Confusion(), Confusion(), Confusion()
     curve = ThresholdCurve.empty()
     towers = TowerMatch(np.empty(0), 0, 0)
     per_sample = []
     pairs = list(zip(dataset.samples, dataset.crops, strict=True))
     for sample, crop in track(pairs, f"{name}: crops scored"):
         probability, truth = answer(sample)
-        counts = confusion(probability, truth, tau)
-        every += counts
-        occupied += confusion(probability[sample.index], truth[sample.index], tau)
+        found, theirs = find_in_crop(sample, probability, tau, detection)
+        said, _ = sample.spread(theirs)
+        of_observer, of_towers = confusion(probability, truth, tau), confusion(said, truth, 0.5)
+        reached += of_observer
+        whole += of_towers
+        chosen, level = (said, 0.5) if whole_towers else (probability, tau)
+        counts = of_towers if whole_towers else of_observer
+        occupied += confusion(chosen[sample.index], truth[sample.index], level)
         curve += ThresholdCurve.of(probability, truth)
-        match = crop_towers(sample, crop, probability, tau, detection)
+        match = match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)
         towers += match
         per_sample.append(
             {
@@ -89,17 +108,23 @@ def score_answers(
                 "fp": counts.fp,
                 "fn": counts.fn,
                 "tn": counts.tn,
+                "f05_observer": of_observer.f05,
+                "f05_towers": of_towers.f05,
                 "towers_true": match.n_true,
                 "towers_predicted": match.n_predicted,
                 "position_error_m": float(match.errors.min()) if len(match.errors) else None,
             }
         )
     shared = {"tau": tau, "n_samples": len(pairs)}
+    every = whole if whole_towers else reached
     return {
         "model": name,
         "seed": seed,
-        "alive": every.tp > 0,
+        "alive": reached.tp > 0,
+        "whole_towers": whole_towers,
         "voxel": every.scores() | shared,
+        "voxel_observer": reached.scores() | shared,
+        "voxel_towers": whole.scores() | shared,
         "voxel_trivial": every.without_predictions().scores() | shared,
         "voxel_occupied": occupied.scores() | shared,
         "towers": towers.scores(),
@@ -109,6 +134,34 @@ def score_answers(
     }
 
 
+def find_in_crop(
+    sample: VoxelSample, probability: np.ndarray, tau: float, detection: DetectionSettings
+) -> tuple[list[DetectedTower], np.ndarray]:
+    """The towers found in a crop, and which of its occupied voxels are theirs, (M,) bool.
+
+    Args:
+        probability: (V,) of every voxel of the sample's grid.
+    """
+    # A tower is made of points: a detected voxel that is empty has nothing to show a person.
+    answers = probability[sample.index]
+    detected = np.flatnonzero(answers >= detection.threshold(tau))
+    centres = sample.grid.centres(sample.index)
+    found = detect_towers(
+        centres[detected],
+        answers[detected],
+        among(centres),
+        sample.grid.voxel_size,
+        tau,
+        detection,
+    )
+    theirs = np.zeros(len(centres), bool)
+    for tower in found:
+        seen = detected[tower.voxels]
+        theirs[seen[answers[seen] >= tau]] = True
+        theirs |= whole_tower(tower, centres, detection)
+    return found, theirs
+
+
 def crop_towers(
     sample: VoxelSample,
     crop: Crop,
@@ -116,21 +169,8 @@ def crop_towers(
     tau: float,
     detection: DetectionSettings,
 ) -> TowerMatch:
-    """Towers found in a crop against the true ones.
-
-    Args:
-        probability: (V,) of every voxel of the sample's grid.
-    """
-    # A tower is made of points: a detected voxel that is empty has nothing to show a person.
-    detected = sample.index[probability[sample.index] >= detection.threshold(tau)]
-    found = detect_towers(
-        sample.grid.centres(detected),
-        probability[detected],
-        among(sample.grid.centres(sample.index)),
-        sample.grid.voxel_size,
-        tau,
-        detection,
-    )
+    """Towers found in a crop against the true ones; probability as in ``find_in_crop``."""
+    found, _ = find_in_crop(sample, probability, tau, detection)
     return match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)
 
 

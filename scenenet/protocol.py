@@ -41,6 +41,11 @@ class FieldSettings(Settings):
         description="weight of a false voxel in the F0.5 that numbers and tau are chosen by: what "
         "is right on the crops at hand is too bold elsewhere",
     )
+    whole_towers: bool = Field(
+        True,
+        description="a voxel is called a tower's where it belongs to a tower that is found, body "
+        "and all (docs/towers.md); false for where it reaches tau, as in the thesis",
+    )
 
 
 class SearchSettings(Settings):

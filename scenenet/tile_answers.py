@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.coverage import LOOK_M, edge_distance
-from scenenet.detection import DetectedTower, DetectionSettings, detect_towers
+from scenenet.detection import DetectedTower, DetectionSettings, detect_towers, whole_tower
 from scenenet.occupied import OccupiedPlaces
 from scenenet.progress import track
 from scenenet.tiles import EDGE, Tile, TileSpool, code_of, groups
@@ -55,9 +55,9 @@ class SurveyTower:
     Attributes:
         tower: where it is.
         id: number in the list, from 1.
-        points: survey points in its voxels.
+        points: survey points in its voxels, those of its body and the detected ones.
         edge_distance: m to the edge of the data.
-        shares: (K,) mean part of each GENEO over its voxels.
+        shares: (K,) mean part of each GENEO over its detected voxels.
     """
 
     tower: DetectedTower
@@ -88,42 +88,43 @@ class TileAnswers:
             TileAnswer(tile.voxel, probability, shares, tower).save(self._path(code_of(tile.place)))
 
     def find_towers(self, tau: float, settings: DetectionSettings) -> list[SurveyTower]:
-        """Towers of the survey; their voxels get their number."""
-        zyx, probability, shares, count = [], [], [], []
+        """Towers of the survey; the voxels of each, body and all, get its number."""
+        zyx, probability, shares = [], [], []
         for tile in self.spool.tiles():
             answer = self._read(code_of(tile.place))
             hits = answer.probability >= settings.threshold(tau)
             zyx.append(tile.zyx()[hits])
             probability.append(answer.probability[hits])
             shares.append(answer.shares[hits])
-            count.append(tile.count[hits])
         if not zyx:
             return []
-        detected = np.concatenate(zyx)
+        detected, certainty = np.concatenate(zyx), np.concatenate(probability)
         occupied = OccupiedPlaces(self.spool)
         found = detect_towers(
             self.spool.centres(detected),
-            np.concatenate(probability),
+            certainty,
             occupied,
             self.spool.voxel_size,
             tau,
             settings,
         )
-        all_shares, counts = np.concatenate(shares), np.concatenate(count)
+        all_shares = np.concatenate(shares)
         towers = []
         for number, tower in enumerate(found, start=1):
             place = np.array([tower.x, tower.y])
-            ground = occupied(place, LOOK_M * 1.5)[:, :2]
+            around = occupied(place, LOOK_M * 1.5)
+            body = around[whole_tower(tower, around, settings)]
+            sure = detected[tower.voxels[certainty[tower.voxels] >= tau]]
+            points = self._number(np.concatenate([body, self.spool.centres(sure)]), number)
             towers.append(
                 SurveyTower(
                     tower,
                     number,
-                    int(counts[tower.voxels].sum()),
-                    edge_distance(place, ground),
+                    points,
+                    edge_distance(place, around[:, :2]),
                     all_shares[tower.voxels].mean(axis=0),
                 )
             )
-            self._number(detected[tower.voxels], number)
         return towers
 
     def of_points(self, xyz: np.ndarray, geneos: list[str]) -> Mapping[str, np.ndarray]:
@@ -141,13 +142,21 @@ class TileAnswers:
         named = {f"share_{geneo}": shares[:, k] for k, geneo in enumerate(geneos)}
         return {"tower_probability": probability, "tower_id": tower} | named
 
-    def _number(self, zyx: np.ndarray, number: int) -> None:
-        """Write the number of a tower into its voxels (M, 3) on the lattice."""
-        codes, voxels = self.spool.locate(self.spool.centres(zyx))
+    def _number(self, centres: np.ndarray, number: int) -> int:
+        """Write the number of a tower into its voxels, (M, 3) m, and count the points in them.
+
+        What a tower before it has stays with that.
+        """
+        points = 0
+        codes, voxels = self.spool.locate(centres)
         for code, rows in groups(codes):
             answer = self._read(code)
-            answer.tower[np.searchsorted(answer.voxel, voxels[rows])] = number
+            at = np.unique(np.searchsorted(answer.voxel, voxels[rows]))
+            mine = at[answer.tower[at] == 0]
+            answer.tower[mine] = number
             answer.save(self._path(code))
+            points += int(self.spool.tile(code).count[mine].sum())
+        return points
 
     def _read(self, code: int) -> TileAnswer:
         return TileAnswer.read(self._path(code))

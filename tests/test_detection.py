@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenenet.detection import DetectionSettings, among, detect_towers
+from scenenet.detection import DetectionSettings, among, detect_towers, whole_tower
 
 TAU = 0.5
 
@@ -197,3 +199,46 @@ def test_where_a_tower_stands_does_not_matter(lattice, pole, east, north):
     [there] = detect(upper(body) + move, lattice.together(lattice.ground(), around) + move)
     assert (there.x - here.x, there.y - here.y) == pytest.approx(tuple(move[:2]), abs=1e-6)
     assert there.height == pytest.approx(here.height)
+
+
+def test_all_of_a_body_is_the_tower_from_above_its_foot_to_its_top(lattice, pole):
+    around, body = pole()
+    beside = lattice.column(1, 0, 3, 6)
+    apart = lattice.column(4, 0, 0, 8)
+    everything = lattice.together(lattice.ground(), around, beside, apart)
+    [tower] = detect(upper(body), everything)
+    mine = {
+        tuple(place) for place in everything[whole_tower(tower, everything, DetectionSettings())]
+    }
+    assert {tuple(p) for p in np.concatenate([body, beside])} >= {
+        p for p in mine if abs(p[0] - tower.x) < 0.1 and abs(p[1] - tower.y) < 0.1
+    }
+    level = {round(p[2] - tower.base, 1) for p in mine}
+    assert min(level) == 1.5  # the voxel on the ground is left out
+    assert max(level) == 14.5
+    assert {tuple(p) for p in beside} <= mine
+    assert not {tuple(p) for p in apart} & mine
+
+
+@pytest.mark.parametrize(("width", "reach"), [(1.0, 2.1), (2.0, 2.1), (6.0, 4.0)])
+def test_the_body_of_a_wide_tower_reaches_further(lattice, pole, width, reach):
+    around, body = pole()
+    [tower] = detect(upper(body), lattice.together(lattice.ground(), around))
+    tower = replace(tower, width=width)
+    x = np.arange(0, 8, 0.05)
+    ring = np.column_stack([tower.x + x, np.full(len(x), tower.y), np.full(len(x), tower.base + 9)])
+    mine = whole_tower(tower, ring, DetectionSettings())
+    assert x[mine].max() == pytest.approx(reach, abs=0.06)
+    assert mine[x < reach - 0.01].all()
+
+
+def test_of_two_axes_of_a_tower_the_one_that_stands_free_is_its_own(lattice, pole):
+    """A taller one that everything touches was found from afar, through a neighbouring tree."""
+    from scenenet import detection
+
+    around, body = pole()
+    [right] = detect(upper(body), lattice.together(lattice.ground(), around))
+    wrong = replace(right, x=right.x + 3, height=right.height + 1, free=0.7)
+    detected = detection._Detected(upper(body), np.full(10, 0.9), 1.0)
+    [kept] = detection._one_of_each([wrong, right], detected, DetectionSettings())
+    assert (kept.x, kept.height) == (right.x, right.height)

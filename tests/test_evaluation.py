@@ -11,9 +11,10 @@ import torch
 from scenenet.crops import Crop
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
-from scenenet.evaluation import evaluate, score
+from scenenet.evaluation import evaluate, score, score_answers
 from scenenet.modelfile import ModelCard, write_model
-from scenenet.models import VoxelModel
+from scenenet.models import VoxelModel, new_model
+from scenenet.protocol import FieldSettings, ModelSettings
 from scenenet.voxel_store import Dataset
 from scenenet.voxels import VoxelGrid, VoxelSample
 
@@ -166,3 +167,40 @@ def test_only_the_part_asked_for_is_scored(chain, pole_finder, tmp_path):
     towers = found["test"]["towers"]
     assert (towers["n_true"], towers["recall"], towers["precision"]) == (3, 1.0, 1.0)
     assert towers["median_error_m"] < 1.0
+
+
+def test_a_tower_that_is_found_counts_whole_and_what_is_none_does_not():
+    """Half of a pole and a low stump reach tau; of the towers, the pole is all that is one."""
+    half = pole(5, low=6) | pole(20, low=0, high=2)
+    samples, crops = zip(crop(1, 5), strict=True)
+    dataset = Dataset(list(samples), list(crops), "edp", [])
+
+    def answer(sample):
+        volume = np.zeros(SHAPE, np.float32)
+        for place, probability in half.items():
+            volume[place] = probability
+        truth = np.zeros(volume.size, bool)
+        truth[sample.tower_index()] = True
+        return volume.reshape(-1), truth
+
+    def counted(**how):
+        return score_answers("m", 0, 0.5, answer, dataset, LONE_POLES, **how)
+
+    observer, towers = counted(), counted(whole_towers=True)
+    assert observer["voxel"] == observer["voxel_observer"] == towers["voxel_observer"]
+    assert towers["voxel"] == towers["voxel_towers"] == observer["voxel_towers"]
+    assert (observer["voxel"]["recall"], observer["voxel"]["precision"]) == (6 / 12, 6 / 8)
+    # The voxel on the ground is no part of a body.
+    assert (towers["voxel"]["recall"], towers["voxel"]["precision"]) == (11 / 12, 1.0)
+    [sample] = towers["per_sample"]
+    assert (sample["tp"], sample["fp"], sample["fn"]) == (11, 0, 1)
+    assert sample["f05_observer"] < sample["f05_towers"] == sample["f05"]
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_model_in_metres_says_whole_towers_unless_it_is_told_not_to(whole):
+    settings = ModelSettings(
+        name="m", kind="scenenet", protocol="field", field=FieldSettings(whole_towers=whole)
+    )
+    result = score(new_model(settings, 0), CARD, Dataset([], [], "edp", []), LONE_POLES)
+    assert result["whole_towers"] is whole

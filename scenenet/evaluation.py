@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from scenenet.coarse import block_edge, coarsened
+from scenenet.convolution import Occupancy
 from scenenet.crops import Crop
 from scenenet.detection import (
     DetectedTower,
@@ -24,7 +26,7 @@ from scenenet.split import crops_in
 from scenenet.training import probabilities
 from scenenet.tuning import curve_columns
 from scenenet.voxel_store import Dataset, load
-from scenenet.voxels import VoxelSample
+from scenenet.voxels import VoxelGrid, VoxelSample
 
 
 def evaluate(
@@ -144,20 +146,24 @@ def find_in_crop(
     """
     # A tower is made of points: a detected voxel that is empty has nothing to show a person.
     answers = probability[sample.index]
-    detected = np.flatnonzero(answers >= detection.threshold(tau))
-    centres = sample.grid.centres(sample.index)
+    size = sample.grid.voxel_size
+    edge = block_edge(size)
+    # Towers are measured in blocks of about a metre: finer voxels have gaps where points are few.
+    blocks, block = coarsened(Occupancy.of_grids([sample.index], None, sample.grid.shape), edge)
+    coarse = VoxelGrid(sample.grid.origin, size * edge, blocks.shape)
+    highest = np.zeros(len(blocks.index), answers.dtype)
+    np.maximum.at(highest, block, answers)
+    detected = np.flatnonzero(highest >= detection.threshold(tau))
+    places = coarse.centres(blocks.index)
     found = detect_towers(
-        centres[detected],
-        answers[detected],
-        among(centres),
-        sample.grid.voxel_size,
-        tau,
-        detection,
+        places[detected], highest[detected], among(places), coarse.voxel_size, tau, detection
     )
+    centres = sample.grid.centres(sample.index)
     theirs = np.zeros(len(centres), bool)
     for tower in found:
-        seen = detected[tower.voxels]
-        theirs[seen[answers[seen] >= tau]] = True
+        seen = np.zeros(len(places), bool)
+        seen[detected[tower.voxels]] = True
+        theirs |= seen[block] & (answers >= tau)
         theirs |= whole_tower(tower, centres, detection)
     return found, theirs
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from scenenet.coarse import block_edge
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
 from scenenet.files import write_json
@@ -24,7 +25,10 @@ class PredictSettings(Settings):
     """How a survey is predicted."""
 
     voxel_size: float | None = Field(
-        None, gt=0, description="m; null for the size the model was trained at"
+        None,
+        gt=0,
+        description="m; null for the size the model was trained at. A model in metres sees finer "
+        "voxels in blocks of about a metre, and so does the survey then",
     )
     chunk_points: int = Field(
         1_000_000, ge=1, description="points read at once; memory grows with it"
@@ -67,6 +71,8 @@ def predict_survey(
     tau = card.threshold()  # before the work: a model without one cannot say what a tower is
     geneos = trained.names if isinstance(trained, SceneNet) else []
     voxel_size = settings.voxel_size or card.voxel_size
+    if trained.field is not None:
+        voxel_size *= block_edge(voxel_size)
     name, crs = Path(path).name, survey_in_metres(path).crs
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
         spool = TileSpool(Path(scratch), voxel_size)

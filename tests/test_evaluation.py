@@ -11,7 +11,7 @@ import torch
 from scenenet.crops import Crop
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
-from scenenet.evaluation import evaluate, score, score_answers
+from scenenet.evaluation import evaluate, find_in_crop, score, score_answers
 from scenenet.modelfile import ModelCard, write_model
 from scenenet.models import VoxelModel, new_model
 from scenenet.protocol import FieldSettings, ModelSettings
@@ -195,6 +195,22 @@ def test_a_tower_that_is_found_counts_whole_and_what_is_none_does_not():
     [sample] = towers["per_sample"]
     assert (sample["tp"], sample["fp"], sample["fn"]) == (11, 0, 1)
     assert sample["f05_observer"] < sample["f05_towers"] == sample["f05"]
+
+
+def test_towers_are_found_in_voxels_finer_than_the_points_are_dense():
+    """A pole with a point every metre and a quarter, in voxels of a quarter of a metre."""
+    grid = VoxelGrid((0.0, 0.0, 0.0), 0.25, (64, 48, 120))
+    ground = [(0, y, x) for y in range(0, 48, 4) for x in range(0, 120, 4)]
+    body = [(z, 24, 60) for z in range(5, 62, 5)]
+    index = np.unique([np.ravel_multi_index(v, grid.shape) for v in [*ground, *body]])
+    true = np.isin(index, [np.ravel_multi_index(v, grid.shape) for v in body])
+    sample = VoxelSample("c", grid, index.astype(np.int32), np.ones_like(index, np.int32), true)
+    probability = np.zeros(grid.n_voxels, np.float32)
+    probability[sample.index[true][3:]] = 1.0  # not its foot
+    [tower], theirs = find_in_crop(sample, probability, 0.5, LONE_POLES)
+    assert (tower.x, tower.y) == pytest.approx((15.1, 6.1), abs=0.5)
+    assert tower.height == pytest.approx(15.5, abs=1.0)
+    np.testing.assert_array_equal(theirs, true)
 
 
 @pytest.mark.parametrize("whole", [True, False])

@@ -16,8 +16,8 @@ import torch
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
 from scenenet.inference import PredictSettings, predict_survey
-from scenenet.modelfile import ModelCard, write_model
-from scenenet.models import CNN
+from scenenet.modelfile import ModelCard, read_model, write_model
+from scenenet.models import CNN, new_model
 from scenenet.pointcloud import PointCloud, read, write_las
 from scenenet.protocol import ModelSettings, TrainingSettings, TuningSettings
 from scenenet.training import fit
@@ -223,6 +223,15 @@ def test_a_predicted_survey_can_be_predicted_again(predicted, model, tmp_path):
 
 def test_the_voxel_size_can_be_set(survey, model, tmp_path):
     assert predict(survey, model, tmp_path, voxel_size=2.0).summary["voxel_size_m"] == 2.0
+
+
+def test_a_model_in_metres_sees_fine_voxels_in_blocks(survey, model, tmp_path):
+    _, card = read_model(model)
+    settings = ModelSettings(name="metric", kind="scenenet", protocol="field")
+    write_model(tmp_path / "metric.json", new_model(settings, 0), card)
+    fine = predict(survey, tmp_path / "metric.json", tmp_path, voxel_size=0.3)
+    assert fine.summary["voxel_size_m"] == pytest.approx(0.9)
+    assert predict(survey, model, tmp_path, voxel_size=0.5).summary["voxel_size_m"] == 0.5
 
 
 def test_towers_are_numbered_in_the_list_and_in_the_points(scene, model, tmp_path):

@@ -10,6 +10,8 @@ from scenenet import tables
 from scenenet.files import atomic
 from scenenet.published import Published, Thesis
 from scenenet.results import Results
+from scenenet.studies.findings import as_good_as_best
+from scenenet.studies.settings import StudySettings
 from scenenet.studies.summary import summarise
 
 if TYPE_CHECKING:
@@ -32,12 +34,15 @@ REMARKS: Mapping[str, str] = {
     "towers.": "The lines are others: the public crops show poles of 10-20 m, the thesis' "
     "statistics pylons.",
     "voxelisation.": "Time on the machine this ran on; counted without sorting.",
+    "protocol.epochs_needed": "The fewest epochs whose F0.5 is not told apart from the best one's; "
+    "an epoch has fewer steps here.",
     "protocol.": "A setting, and not a result; see the settings of the run.",
     "parameters.": "Weights of runs are comparable only as far as the kernels' values are.",
     "models.": "Other and fewer crops than the thesis had.",
     "times.": "Time on the machine this ran on, with other and fewer crops.",
     "kernel_size.": "Other and fewer crops than the thesis had.",
     "ablation.": "Other and fewer crops than the thesis had.",
+    "starts.": "Other and fewer crops than the thesis had.",
     "measurement.": "Measured by F0.5 here, by the loss in the thesis.",
     "loss.": "Depends on the data and on the weights f_w.",
 }
@@ -178,10 +183,21 @@ def _of_studies(results: Results, thesis: Thesis) -> dict[str, float | None]:
             if variant.thesis:
                 for score in ("precision", "recall", "miou"):
                     found[f"{variant.thesis}.{score}"] = float(row[score])
+                found[f"{variant.thesis}.alive_share"] = 100 * float(row["live_share"])
             if variant.thesis == "kernel_size.9x9x9":
                 found["times.scenenet.inference"] = float(row["inference_ms"])
+        if study.name == "alpha-epsilon":
+            found["loss.combinations"] = len(summary)
+        if study.name == "epochs":
+            enough = summary.index[as_good_as_best(summary)]
+            found["protocol.epochs_needed"] = min(_epochs(study, name) for name in enough)
         if study.name == "measurement":
             presence, density = (float(value) for value in summary["f05"].iloc[:2])
             if density:
                 found["measurement.presence_lift"] = 100 * (presence - density) / density
     return found
+
+
+def _epochs(study: StudySettings, variant: str) -> float:
+    changes = next(v.changes for v in study.all_variants() if v.name == variant)
+    return float(changes["training.epochs"])

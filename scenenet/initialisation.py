@@ -1,8 +1,14 @@
-"""Where a training by gradient begins, if it is to look at the data first (``init: field``).
+"""Where a training by gradient begins (thesis 5.2.1, 5.3.4).
+
+- ``thesis``: numbers are drawn once, a SCENE-Net's from the ranges that stand beside its kernels
+  and a CNN's as torch does (``scenenet.models``).
+- ``unranged``: "not enforcing ranges" (5.3.4), every number of a SCENE-Net from N(0, 1).
+- ``handcrafted``: "handcrafted values" (5.3.4), the same for every seed.
+- ``field``: the data are looked at first.
 
 A model is dead where its observer is negative at everything that matters: ReLU then answers zero,
 lets no gradient through, and training never moves (thesis 5.2.6: "only one in five trained CNNs
-returns non-zero predictions"). Both ways here begin where towers are told from the rest.
+returns non-zero predictions"). Both ways of ``field`` begin where towers are told from the rest.
 """
 
 from __future__ import annotations
@@ -15,6 +21,7 @@ from torch import Tensor
 
 from scenenet.batches import batch
 from scenenet.convolution import convolve_at_voxels
+from scenenet.geneo import kernel_named
 from scenenet.metrics import BETA, THRESHOLDS, ThresholdCurve
 from scenenet.models import CNN, SceneNet, VoxelModel, new_model
 from scenenet.observer import count_reached
@@ -27,6 +34,33 @@ DRAWS = 64
 """Sets of numbers that a SCENE-Net begins at the best of."""
 NOISE = 0.1
 """Part of the random weights that a CNN keeps, which tells its kernels and the seeds apart."""
+
+
+def starting_model(
+    settings: ModelSettings, seed: int, training: Sequence[VoxelSample]
+) -> VoxelModel:
+    """A new model that begins as ``settings.training.init`` says."""
+    init = settings.training.init
+    if init == "field":
+        return informed_model(settings, seed, training)
+    model = new_model(settings, seed)
+    if isinstance(model, SceneNet) and init == "unranged":
+        generator = torch.Generator().manual_seed(seed)
+        model.set_numbers(torch.randn(model.n_parameters(), generator=generator).numpy())
+    if isinstance(model, SceneNet) and init == "handcrafted":
+        model.set_shape_parameters(handcrafted(model))
+    return model
+
+
+def handcrafted(model: SceneNet) -> dict[str, float]:
+    """Numbers that were set by hand, by name: the kernels' own (``ShapeParameter.handcrafted``),
+    and every kernel with the same weight."""
+    shapes = {
+        f"{name}.{parameter.name}": parameter.handcrafted
+        for name, geneo in zip(model.names, model.geneos, strict=True)
+        for parameter in kernel_named(geneo).parameters
+    }
+    return shapes | {f"lambda.{name}": 1 / len(model.names) for name in model.names}
 
 
 def informed_model(

@@ -1,7 +1,8 @@
-"""The GENEO loss: a weighted squared error and two penalties (thesis 4.5)."""
+"""The GENEO loss: a weighted error and two penalties (thesis 4.5, 5.3.3)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import torch
 from torch import Tensor
 
 from scenenet.convolution import Occupancy
+from scenenet.cross_entropy import cross_entropy
 from scenenet.models import SceneNet, VoxelModel
 from scenenet.observer import squared_error
 from scenenet.protocol import LossSettings
@@ -39,30 +41,46 @@ class VoxelWeights:
         return cls(empty / mean, tower / mean)
 
 
+ERRORS: Mapping[str, Callable[..., Tensor]] = {
+    "squared": squared_error,
+    "cross_entropy": cross_entropy,
+}
+PENALTIES: Mapping[str, Callable[[Tensor], Tensor]] = {
+    "linear": lambda numbers: torch.relu(-numbers),
+    "quadratic": lambda numbers: torch.relu(-numbers).square(),
+}
+"""h, the penalty on negative numbers (thesis Figure 4.5). The quadratic one was the thesis' first
+(5.3.3): its slope is next to nothing just below zero, where the linear one's is still rho."""
+
+
 def fidelity(
-    model: VoxelModel, occupancy: Occupancy, tower: np.ndarray, weights: VoxelWeights
+    model: VoxelModel,
+    occupancy: Occupancy,
+    tower: np.ndarray,
+    weights: VoxelWeights,
+    kind: str = "squared",
 ) -> Tensor:
-    """L_seg = mean of f_w(y) (M(x) - y)^2 over all voxels, empty ones included (thesis 4.5.1).
+    """L_seg = mean of f_w(y) e(M(x), y) over all voxels, empty ones included (thesis 4.5.1).
 
     Args:
         occupancy: the batch.
         tower: (T,) int64, ascending positions in (B, D, H, W) of the voxels whose target y is 1.
+        kind: of the error e: ``squared``, (M(x) - y)^2, or ``cross_entropy`` (5.3.3).
     """
     kernel, bias = model.observer()
-    error = squared_error(occupancy, kernel, bias, tower, (weights.empty, weights.tower))
+    error = ERRORS[kind](occupancy, kernel, bias, tower, (weights.empty, weights.tower))
     return error / occupancy.n_voxels
 
 
 def negativity(model: VoxelModel, settings: LossSettings) -> Tensor:
-    """rho_l sum h(lambda_i) + rho_t sum h(theta_i), h(x) = (-x)_+ (thesis Eq. 4.3).
+    """rho_l sum h(lambda_i) + rho_t sum h(theta_i) (thesis Eq. 4.3).
 
-    A model without shape parameters has nothing to penalise.
+    h is the one of ``PENALTIES`` that ``settings`` name. A model without shape parameters has
+    nothing to penalise.
     """
     if not isinstance(model, SceneNet):
         return torch.zeros(())
+    h = PENALTIES[settings.penalty]
     shapes = torch.stack([v for name in model.names for v in model.shape_of(name).values()])
     mixing = model.mixing_weights()
-    return (
-        settings.rho_shape * torch.relu(-shapes).sum()
-        + settings.rho_mixing * torch.relu(-mixing).sum()
-    )
+    return settings.rho_shape * h(shapes).sum() + settings.rho_mixing * h(mixing).sum()

@@ -5,9 +5,9 @@ They stand by themselves because reading the configuration must not load torch.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from scenenet.settings import Settings
 
@@ -18,6 +18,9 @@ Measurement = Literal["presence", "density"]
 
 
 Protocol = Literal["thesis", "field"]
+Init = Literal["thesis", "field", "unranged", "handcrafted"]
+OF_RANGES: tuple[Init, ...] = ("unranged", "handcrafted")
+"""Starts that say something of ranges, which a CNN does not have."""
 
 
 class FieldSettings(Settings):
@@ -64,8 +67,17 @@ class SearchSettings(Settings):
 
 
 class LossSettings(Settings):
-    """The GENEO loss (thesis 4.5)."""
+    """The GENEO loss (thesis 4.5), and what was tried in its stead (5.3.3)."""
 
+    fidelity: Literal["squared", "cross_entropy"] = Field(
+        "squared",
+        description="how far an answer is from the truth: squared error (thesis 4.5), or cross "
+        "entropy with the same weights (5.3.3)",
+    )
+    penalty: Literal["linear", "quadratic"] = Field(
+        "linear",
+        description="h(x) of a negative number: -x (thesis Figure 4.5), or x^2 as at first (5.3.3)",
+    )
     alpha: float = Field(5.0, ge=0, description="emphasis of the weighting scheme f_w")
     epsilon: float = Field(0.1, gt=0, description="smallest weight before normalisation")
     rho_shape: float = Field(5.0, ge=0, description="rho_t, penalty on negative shape parameters")
@@ -75,19 +87,29 @@ class LossSettings(Settings):
 class TrainingSettings(Settings):
     """How a model is trained."""
 
-    init: Protocol = Field(
+    init: Init = Field(
         "thesis",
         description="thesis: numbers drawn once; field: the best of many draws on the training "
-        "crops, and for a CNN what tells the surroundings of tower voxels from those of others",
+        "crops, and for a CNN what tells the surroundings of tower voxels from those of others; "
+        "for a SCENE-Net also (thesis 5.3.4) unranged: drawn from N(0, 1), ranges or not, and "
+        "handcrafted: the values that stand beside each kernel, the same for every seed",
     )
     epochs: int = Field(50, ge=1, description="passes over the training set")
     batch_size: int = Field(8, ge=1, description="crops a step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
     learning_rate: float = Field(0.001, gt=0, description="step size of the optimiser")
+    decay: float = Field(
+        0.0, ge=0, lt=1, description="share that the learning rate loses every so often (5.3.4)"
+    )
+    decay_every: int = Field(10, ge=1, description="epochs from one such loss to the next")
     device: Literal["cpu", "cuda"] = Field(
         "cpu", description="where the steps are taken; cuda needs a GPU that torch can use"
     )
     loss: LossSettings = LossSettings()
+
+    def rate(self, epoch: int) -> float:
+        """The learning rate of an epoch, counted from 1."""
+        return self.learning_rate * (1 - self.decay) ** ((epoch - 1) // self.decay_every)
 
 
 class ModelSettings(Settings):
@@ -109,6 +131,14 @@ class ModelSettings(Settings):
     kernel_size: KernelSize = Field((9, 9, 9), description="(kz, ky, kx) in voxels")
     measurement: Measurement = Field("presence", description="phi (thesis 4.2.2, 5.3.2)")
     training: TrainingSettings = TrainingSettings()
+
+    @model_validator(mode="after")
+    def _start_fits(self) -> Self:
+        if self.kind == "cnn" and self.training.init in OF_RANGES:
+            raise ValueError(
+                f"training.init {self.training.init} is for a SCENE-Net; a CNN has no ranges"
+            )
+        return self
 
 
 class TuningSettings(Settings):

@@ -16,11 +16,11 @@ from scenenet.batches import batch
 from scenenet.errors import InputError
 from scenenet.field import fit_field
 from scenenet.files import atomic, digest
-from scenenet.initialisation import informed_model
+from scenenet.initialisation import starting_model
 from scenenet.losses import VoxelWeights, fidelity, negativity
 from scenenet.metrics import THRESHOLDS, ThresholdCurve
 from scenenet.modelfile import ModelCard, write_model
-from scenenet.models import SceneNet, VoxelModel, new_model
+from scenenet.models import SceneNet, VoxelModel
 from scenenet.observer import count_reached
 from scenenet.progress import track
 from scenenet.protocol import Measurement, ModelSettings, TrainingSettings
@@ -130,10 +130,7 @@ def fit(
     identity = _identity(training, validation, settings, seed)
     if settings.protocol == "field" and settings.kind == "scenenet":
         return fit_field(training, validation, settings, seed, identity, checkpoint=checkpoint)
-    if protocol.init == "field":
-        model = informed_model(settings, seed, training).to(protocol.device)
-    else:
-        model = new_model(settings, seed).to(protocol.device)
+    model = starting_model(settings, seed, training).to(protocol.device)
     optimiser = OPTIMISERS[protocol.optimiser](model.parameters(), lr=protocol.learning_rate)
     n_tower = sum(int(sample.tower.sum()) for sample in training)
     n_voxels = sum(sample.grid.n_voxels for sample in training)
@@ -141,16 +138,19 @@ def fit(
     history = _resume(checkpoint, identity, model, optimiser)
     label = f"{settings.name} seed {seed}: epochs"
     for epoch in track(range(len(history) + 1, protocol.epochs + 1), label):
-        begin = time.perf_counter()
+        started = time.perf_counter()
+        # It follows from the epoch alone, so a resumed training goes on at the same rate.
+        for group in optimiser.param_groups:
+            group["lr"] = protocol.rate(epoch)
         row = _epoch(model, optimiser, training, settings, weights, [seed, epoch])
-        row["seconds"] = time.perf_counter() - begin
+        row["seconds"] = time.perf_counter() - started
         if not np.isfinite(row["loss"]):
             raise InputError(
                 f"training {settings.name} from seed {seed} lost its way: the loss of epoch "
                 f"{epoch} is {row['loss']}",
                 remedy="Set a lower training.learning_rate",
             )
-        row |= _validate(model, validation, settings.measurement, weights)
+        row |= _validate(model, validation, settings, weights)
         if isinstance(model, SceneNet):
             row |= model.shape_parameters()
         history.append({"epoch": epoch} | row)
@@ -207,7 +207,7 @@ def _epoch(
         chosen = [training[i] for i in order[start : start + protocol.batch_size]]
         occupancy, towers = batch(chosen, settings.measurement)
         optimiser.zero_grad()
-        error = fidelity(model, occupancy, towers, weights)
+        error = fidelity(model, occupancy, towers, weights, protocol.loss.fidelity)
         penalty = negativity(model, protocol.loss)
         loss = error + penalty
         loss.backward()
@@ -220,7 +220,7 @@ def _epoch(
 def _validate(
     model: VoxelModel,
     validation: Sequence[VoxelSample],
-    measurement: Measurement,
+    settings: ModelSettings,
     weights: VoxelWeights,
 ) -> dict[str, float]:
     """Loss and best F0.5 on the validation part; NaN where there is none."""
@@ -230,12 +230,13 @@ def _validate(
     with torch.no_grad():
         for start in range(0, len(validation), EVALUATED_AT_ONCE):
             chosen = validation[start : start + EVALUATED_AT_ONCE]
-            occupancy, towers = batch(chosen, measurement)
-            errors.append(fidelity(model, occupancy, towers, weights).item())
+            occupancy, towers = batch(chosen, settings.measurement)
+            kind = settings.training.loss.fidelity
+            errors.append(fidelity(model, occupancy, towers, weights, kind).item())
             sizes.append(occupancy.n_voxels)
     return {
         "validation_loss": float(np.average(errors, weights=sizes)),
-        "validation_f05": threshold_curve(model, validation, measurement).best()[1].f05,
+        "validation_f05": threshold_curve(model, validation, settings.measurement).best()[1].f05,
     }
 
 

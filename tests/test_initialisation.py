@@ -8,7 +8,9 @@ import torch
 
 from scenenet.batches import batch
 from scenenet.convolution import convolve_at_voxels
-from scenenet.initialisation import discriminant, informed_model
+from scenenet.geneo import kernel_named
+from scenenet.initialisation import discriminant, informed_model, starting_model
+from scenenet.models import new_model
 from scenenet.protocol import ModelSettings, TrainingSettings
 from scenenet.training import fit, threshold_curve
 from scenenet.voxels import VoxelGrid, voxelise
@@ -69,3 +71,44 @@ def test_seeds_begin_apart_and_one_seed_begins_at_one_place(toys, kind):
         assert torch.equal(a, b)
     pairs = zip(one.parameters(), other.parameters(), strict=True)
     assert any(not torch.equal(a, b) for a, b in pairs)
+
+
+def test_the_thesis_start_is_the_one_that_is_drawn_from_the_ranges(toys):
+    begun = starting_model(settings("scenenet", "thesis"), 3, toys)
+    drawn = new_model(settings("scenenet", "thesis"), 3)
+    assert begun.shape_parameters() == drawn.shape_parameters()
+    for name in begun.names:
+        for parameter in kernel_named(name).parameters:
+            value = begun.shape_parameters()[f"{name}.{parameter.name}"]
+            assert parameter.low <= value <= parameter.high
+
+
+def test_without_ranges_numbers_are_normal_and_mostly_outside_of_them(toys):
+    told = [
+        starting_model(settings("scenenet", "unranged"), seed, toys).numbers() for seed in range(60)
+    ]
+    drawn = np.concatenate(told)
+    assert abs(drawn.mean()) < 0.15
+    assert abs(drawn.std() - 1) < 0.1
+    assert 0.4 < (drawn < 0).mean() < 0.6
+    again = starting_model(settings("scenenet", "unranged"), 7, toys).numbers()
+    np.testing.assert_array_equal(told[7], again)
+
+
+def test_values_by_hand_lie_in_their_ranges_and_are_the_same_for_every_seed(toys):
+    chosen = settings("scenenet", "handcrafted")
+    chosen = chosen.model_copy(update={"geneos": ("cylinder", "arrow", "negative_sphere", "arrow")})
+    one, other = (starting_model(chosen, seed, toys) for seed in (0, 1))
+    numbers = one.shape_parameters()
+    assert numbers == other.shape_parameters()
+    for name, geneo in zip(one.names, one.geneos, strict=True):
+        assert numbers[f"lambda.{name}"] == pytest.approx(0.25)
+        for parameter in kernel_named(geneo).parameters:
+            assert parameter.low <= numbers[f"{name}.{parameter.name}"] <= parameter.high
+    assert numbers["cylinder.r"] == pytest.approx(2.0)  # half of 4.15 m, in voxels of a metre
+
+
+@pytest.mark.parametrize("init", ["unranged", "handcrafted"])
+def test_a_cnn_has_no_ranges_to_leave(init):
+    with pytest.raises(ValueError, match=r"training.init .* a CNN has no ranges"):
+        settings("cnn", init)

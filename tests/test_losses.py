@@ -112,6 +112,39 @@ def test_the_penalty_pushes_a_negative_number_up_and_leaves_the_others():
     assert model.shapes["cylinder"]["r"].grad.item() == 0.0
 
 
+def test_a_quadratic_penalty_is_weak_just_below_zero_where_a_linear_one_is_not():
+    slopes = {}
+    for penalty in ("linear", "quadratic"):
+        model = SceneNet()
+        model.set_shape_parameters(POSITIVE | {"cylinder.sigma": -0.01, "arrow.r": -2.0})
+        settings = LossSettings(penalty=penalty, rho_shape=5.0)
+        loss = negativity(model, settings)
+        loss.backward()
+        sigma, r = model.shapes["cylinder"]["sigma"], model.shapes["arrow"]["r"]
+        # The square of what torch itself says is negative, or that.
+        lacks = torch.relu(-torch.stack([sigma, r]).detach())
+        expected = lacks.sum() if penalty == "linear" else (lacks**2).sum()
+        torch.testing.assert_close(loss.detach(), 5.0 * expected)
+        slopes[penalty] = (sigma.grad.item(), r.grad.item())
+    assert slopes["linear"] == pytest.approx((-5.0, -5.0))
+    assert slopes["quadratic"] == pytest.approx((-0.1, -20.0))
+
+
+@given(st.integers(0, 99))
+def test_fidelity_is_the_mean_of_the_weighted_cross_entropy(seed):
+    occupancy, tower = scene(seed)
+    weights = VoxelWeights(empty=0.7, tower=9.0)
+    model = SceneNet(kernel_size=(3, 3, 3), generator=torch.Generator().manual_seed(seed))
+    with torch.no_grad():
+        prediction = model(occupancy).reshape(-1).double()
+    truth = torch.zeros(occupancy.n_voxels, dtype=torch.float64)
+    truth[torch.from_numpy(tower)] = 1
+    likelihood = torch.where(truth > 0, prediction.clamp(min=1e-6), 1 - prediction)
+    expected = -(torch.where(truth > 0, 9.0, 0.7) * likelihood.log()).mean()
+    got = fidelity(model, occupancy, tower, weights, "cross_entropy")
+    torch.testing.assert_close(got.double(), expected, rtol=1e-4, atol=1e-5)
+
+
 def test_a_cnn_has_nothing_to_be_negative_about():
     assert negativity(CNN(), LossSettings()).item() == 0.0
 
@@ -120,3 +153,4 @@ def test_the_defaults_are_those_of_the_thesis():
     settings = LossSettings()
     assert (settings.alpha, settings.epsilon) == (5.0, 0.1)
     assert (settings.rho_shape, settings.rho_mixing) == (5.0, 5.0)
+    assert (settings.fidelity, settings.penalty) == ("squared", "linear")

@@ -10,6 +10,7 @@ import torch
 from scenenet import training
 from scenenet.batches import batch
 from scenenet.errors import InputError
+from scenenet.losses import VoxelWeights, fidelity
 from scenenet.modelfile import read_model
 from scenenet.protocol import LossSettings, ModelSettings, TrainingSettings
 from scenenet.training import fit, probabilities, threshold_curve, train
@@ -80,9 +81,20 @@ def cut_after(monkeypatch):
 
 
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-@pytest.mark.parametrize("optimiser", ["rmsprop", "adam", "sgd"])
-def test_a_resumed_training_is_the_uninterrupted_one(toys, cut_after, tmp_path, kind, optimiser):
-    chosen = settings(kind, epochs=5, optimiser=optimiser)
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"optimiser": "rmsprop"},
+        {"optimiser": "adam"},
+        {"optimiser": "sgd"},
+        {"decay": 0.5, "decay_every": 1},
+        {"decay": 0.25, "decay_every": 3},  # the next loss of rate comes after the interruption
+        {"loss": LossSettings(fidelity="cross_entropy", penalty="quadratic")},
+    ],
+    ids=str,
+)
+def test_a_resumed_training_is_the_uninterrupted_one(toys, cut_after, tmp_path, kind, changes):
+    chosen = settings(kind, epochs=5, **changes)
     straight, straight_history = fit(toys[:3], toys[3:], chosen, 1)
     undo = cut_after(2)
     with pytest.raises(PowerCut):
@@ -94,6 +106,41 @@ def test_a_resumed_training_is_the_uninterrupted_one(toys, cut_after, tmp_path, 
     pd.testing.assert_frame_equal(
         history.drop(columns="seconds"), straight_history.drop(columns="seconds"), check_exact=True
     )
+
+
+def test_the_rate_is_that_of_torchs_own_schedule():
+    chosen = TrainingSettings(learning_rate=0.4, decay=0.25, decay_every=3)
+    optimiser = torch.optim.SGD([torch.zeros(1, requires_grad=True)], lr=0.4)
+    schedule = torch.optim.lr_scheduler.StepLR(optimiser, step_size=3, gamma=0.75)
+    for epoch in range(1, 12):
+        assert chosen.rate(epoch) == pytest.approx(optimiser.param_groups[0]["lr"])
+        optimiser.step()
+        schedule.step()
+    assert {TrainingSettings(learning_rate=0.4).rate(epoch) for epoch in range(1, 99)} == {0.4}
+
+
+def test_a_rate_that_has_decayed_moves_less(toys):
+    whole, decayed = (
+        fit(toys[:3], [], settings(epochs=4, decay=share, decay_every=1), 0)[1]
+        for share in (0.0, 0.9)
+    )
+    assert whole["cylinder.r"].iloc[0] == decayed["cylinder.r"].iloc[0]
+    steps = [h["cylinder.r"].diff().abs().iloc[-1] for h in (whole, decayed)]
+    assert 0 < steps[1] < 0.1 * steps[0]
+
+
+@pytest.mark.parametrize("kind", ["scenenet", "cnn"])
+def test_cross_entropy_falls_too_and_is_what_validation_tells(toys, kind):
+    init = "field" if kind == "cnn" else "thesis"
+    chosen = settings(kind, epochs=30, init=init, loss=LossSettings(fidelity="cross_entropy"))
+    model, history = fit(toys[:3], toys[3:], chosen, seed=0)
+    assert history["fidelity"].iloc[-1] < 0.9 * history["fidelity"].iloc[0]
+    occupancy, towers = batch(toys[3:], "presence")
+    n_tower, n = sum(t.tower.sum() for t in toys[:3]), sum(t.grid.n_voxels for t in toys[:3])
+    weights = VoxelWeights.of_counts(n_tower, n, alpha=5.0, epsilon=0.1)
+    with torch.no_grad():
+        told = fidelity(model, occupancy, towers, weights, "cross_entropy").item()
+    assert history["validation_loss"].iloc[-1] == pytest.approx(told)
 
 
 @pytest.mark.parametrize("what", ["settings", "seed", "samples", "nothing but noise"])

@@ -113,7 +113,7 @@ def draw_study(
     if runs is None:
         raise InputError("has not been run", file=results.folder / "studies" / study.name)
     summary = summarise(study, runs, thesis or Thesis(source="", numbers={}))
-    if len(study.vary) == 2:
+    if study.is_grid:
         names, values = zip(*study.vary.items(), strict=True)
         first, second = (name.rpartition(".")[2] for name in names)
         alt = studies.heat_map(summary, (first, second), (len(values[0]), len(values[1])), out)

@@ -10,6 +10,13 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
+BASE = 2.0
+"""Radius in voxels that a tower's body has by hand: half of the mean width of 4.15 m (thesis 5.1.2)
+in voxels of about a metre, as a crop has at 64^3."""
+
+THINNEST = 1e-6
+"""Least sigma of a shell, in squared units of length."""
+
 
 @dataclass(frozen=True)
 class ShapeParameter:
@@ -22,6 +29,8 @@ class ShapeParameter:
         meaning: what it says about a tower, as part of a sentence.
         metric: the range it stays within where kernels are in metres, in ``metric_unit``; low and
             high, and never below a thousandth of high, if None.
+        by_hand: what somebody who knows towers would set it to, in ``unit`` (thesis 5.3.4,
+            "handcrafted values"); the middle of the range if None.
     """
 
     name: str
@@ -30,6 +39,12 @@ class ShapeParameter:
     unit: str
     meaning: str
     metric: tuple[float, float] | None = None
+    by_hand: float | None = None
+
+    @property
+    def handcrafted(self) -> float:
+        """Its value by hand, in ``unit``."""
+        return (self.low + self.high) / 2 if self.by_hand is None else self.by_hand
 
     @property
     def metric_unit(self) -> str:
@@ -150,6 +165,9 @@ def zero_sum(kernel: Tensor, inside: Tensor | None = None) -> Tensor:
 def gaussian_shell(squared_distance: Tensor, squared_radius: Tensor, sigma: Tensor) -> Tensor:
     """exp(-(d^2 - r^2)^2 / (2 sigma^2)): one on the shell of radius r, falling off on both sides.
 
-    The thesis compares squared lengths, so sigma is a squared length as well.
+    The thesis compares squared lengths, so sigma is a squared length as well. One that is nearly 0,
+    as a penalty leaves where it was negative, counts as ``THINNEST``: there is no shell to speak of
+    left, but a number and a slope of 0 and not the quotient of two zeros.
     """
-    return torch.exp(-((squared_distance - squared_radius) ** 2) / (2 * sigma**2))
+    spread = 2 * sigma.square().clamp(min=THINNEST**2)
+    return torch.exp(-((squared_distance - squared_radius) ** 2) / spread)

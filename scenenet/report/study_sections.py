@@ -12,6 +12,7 @@ from scenenet.comparison import (
 )
 from scenenet.report.blocks import Block, Column, Facts, Figure, Heading, Section, Text, table
 from scenenet.report.material import VOXEL_SCORES, Material, beside
+from scenenet.studies.findings import findings
 
 VERDICTS = (REPRODUCED, BETTER, NOT, UNMEASURED)
 
@@ -26,9 +27,11 @@ def studies(material: Material) -> Section | None:
             continue
         columns = [
             Column("variant", study.title.lower()),
-            Column("live_share", "share alive", "score2"),
+            Column("alive", f"alive of {len(study.seeds)}", "count"),
             *beside(VOXEL_SCORES),
             Column("parameters", "parameters", "count"),
+            Column("negative_share", "seeds with a negative number", "score2"),
+            Column("lowest_weight", "lowest weight", "score"),
             Column("training_crops", "crops", "count"),
             Column("training_seconds", "training", "seconds"),
         ]
@@ -36,7 +39,9 @@ def studies(material: Material) -> Section | None:
             f"Scores on the {study.part} crops, mean ± standard deviation over "
             f"{len(study.seeds)} seeds. Thesis {study.place}."
         )
-        blocks += [Heading(study.title), Text(study.asks)]
+        said = f" The thesis: {study.thesis_says}" if study.thesis_says else ""
+        found = findings(study, frame)
+        blocks += [Heading(study.title), Text(study.asks), Text(f"{found}{said}")]
         if picture := pictures.get(f"study-{study.name}"):
             blocks.append(Figure(picture))
         source = f"tables/study-{study.name}.csv"

@@ -3,6 +3,7 @@
 - ``settings``: what a study varies.
 - ``run``: its trainings, one after the other, and their scores.
 - ``summary``: mean and spread over seeds, the thesis' numbers beside.
+- ``findings``: what came out, in a sentence or two.
 """
 
 from __future__ import annotations

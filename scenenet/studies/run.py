@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
     import pandas as pd
 
 COLUMNS = (
-    "variant", "seed", "alive", "tau", "precision", "recall", "f05", "iou_tower", "miou",
+    "variant", "seed", "kind", "alive", "tau", "precision", "recall", "f05", "iou_tower", "miou",
     "average_precision", "validation_f05", "training_crops", "parameters", "epochs", "loss",
-    "training_seconds", "inference_ms",
+    "lowest_weight", "lowest_shape", "training_seconds", "inference_ms",
 )  # fmt: skip
 
 
@@ -49,7 +50,8 @@ def run_study(
         crop_manifests: of the crop stores.
         study: what to vary.
         model, voxels, split: what is varied.
-        out: CSV file, columns ``COLUMNS``.
+        out: CSV file, columns ``COLUMNS``; ``lowest_weight`` and ``lowest_shape`` are the lowest
+            mixing weight and shape parameter of a SCENE-Net after training.
 
     Returns:
         what was written.
@@ -114,12 +116,24 @@ def _trained(
     begin = time.perf_counter()
     model, history = fit(training, [], settings, seed)
     return model, {
+        "kind": model.kind,
+        **_lowest(model),
         "training_crops": len(training),
         "parameters": model.n_parameters(),
         "epochs": len(history),
         "loss": float(history["loss"].iloc[-1]),
         "training_seconds": time.perf_counter() - begin,
     }
+
+
+def _lowest(model: VoxelModel) -> dict[str, float]:
+    """Below zero they break the convexity that the loss is to keep (thesis 4.5, 5.3.3)."""
+    if not isinstance(model, SceneNet):
+        return {"lowest_weight": math.nan, "lowest_shape": math.nan}
+    numbers = model.shape_parameters()
+    mixing = [value for name, value in numbers.items() if name.startswith("lambda.")]
+    shapes = [value for name, value in numbers.items() if not name.startswith("lambda.")]
+    return {"lowest_weight": min(mixing), "lowest_shape": min(shapes)}
 
 
 def _applied(model: VoxelModel, plan: Plan) -> VoxelModel:

@@ -39,6 +39,7 @@ class StudySettings(Settings):
     title: str = Field(description="heading in the report")
     place: str = Field(description="where the thesis asks the same")
     asks: str = Field(description="the question, as a sentence")
+    thesis_says: str | None = Field(None, description="what the thesis found, as a sentence")
     model: str = Field("scenenet", description="name of the model that is varied")
     seeds: tuple[int, ...] = Field((0, 1, 2), min_length=1, description="seeds of every variant")
     part: Literal["validation", "test"] = Field("test", description="crops that are scored")
@@ -48,24 +49,29 @@ class StudySettings(Settings):
     variants: tuple[Variant, ...] = Field((), description="what is compared")
     vary: dict[str, tuple[Any, ...]] = Field(
         default_factory=dict,
-        description="or: dotted settings and the values of each; every combination is a variant",
+        description="dotted settings and the values of each; every combination is a variant, after "
+        "those that are spelt out",
     )
 
     @model_validator(mode="after")
     def _has_variants(self) -> Self:
-        if bool(self.variants) == bool(self.vary):
-            raise ValueError(f"study {self.name}: give either variants or vary")
+        if not self.variants and not self.vary:
+            raise ValueError(f"study {self.name}: give variants, or vary, or both")
         names = [variant.name for variant in self.all_variants()]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise ValueError(f"study {self.name}: {', '.join(twice)} is there more than once")
         return self
 
     def all_variants(self) -> tuple[Variant, ...]:
-        """The variants, those of ``vary`` spelt out in the order of its values."""
-        if self.variants:
-            return self.variants
-        combinations = product(*self.vary.values())
-        return tuple(_named(dict(zip(self.vary, values, strict=True))) for values in combinations)
+        """The variants, those of ``vary`` last and in the order of its values."""
+        combinations = product(*self.vary.values()) if self.vary else ()
+        varied = (_named(dict(zip(self.vary, values, strict=True))) for values in combinations)
+        return (*self.variants, *varied)
+
+    @property
+    def is_grid(self) -> bool:
+        """Whether the variants are all combinations of two settings, and nothing else."""
+        return len(self.vary) == 2 and not self.variants
 
     def plans(
         self, model: ModelSettings, voxels: VoxelSettings, split: SplitSettings
@@ -158,4 +164,7 @@ def _named(changes: dict[str, Any]) -> Variant:
 
 
 def _written(value: Any) -> str:
-    return "x".join(map(str, value)) if isinstance(value, list | tuple) else f"{value}"
+    if isinstance(value, list | tuple):
+        return "x".join(map(str, value))
+    # Written out, as the thesis does: 0.00001 and not 1e-05.
+    return f"{value:.12f}".rstrip("0").rstrip(".") if isinstance(value, float) else f"{value}"

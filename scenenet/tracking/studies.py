@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FACTS = (
     "tau", "alive", "training_crops", "parameters", "epochs", "loss", "training_seconds",
-    "inference_ms",
+    "inference_ms", "lowest_weight", "lowest_shape",
 )  # fmt: skip
 
 
@@ -53,7 +53,8 @@ def study_groups(study: StudySettings, runs: pd.DataFrame, dataset: str) -> list
                 name=f"{variant.name}, seed {row['seed']}",
                 params=params | {"seed": row["seed"]},
                 metrics=_metrics(row, study.part),
-                tags=tags | {"variant": variant.name, "seed": str(row["seed"])},
+                tags=tags
+                | {"kind": str(row["kind"]), "variant": variant.name, "seed": str(row["seed"])},
                 seconds=float(row["training_seconds"]),
             )
             for row in rows
@@ -65,6 +66,7 @@ def study_groups(study: StudySettings, runs: pd.DataFrame, dataset: str) -> list
             metrics=_means([child.metrics for child in children]),
             tags=tags
             | {
+                "kind": str(rows[0]["kind"]),
                 "variant": variant.name,
                 "mlflow.note.content": f"{study.asks} Mean over {len(rows)} seeds; thesis "
                 f"{study.place}.",

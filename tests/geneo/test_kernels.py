@@ -180,3 +180,16 @@ def test_parameters_say_range_unit_and_meaning(name):
         assert 0 < parameter.low < parameter.high  # the thesis wants them non-negative
         assert parameter.unit in {"voxel", "voxel^2", "1"}
         assert parameter.meaning
+
+
+@pytest.mark.parametrize("sigma", [0.0, -1e-10, 1e-20, 1e-7, -1e-4])
+@pytest.mark.parametrize("radius", [0.0, 1.0, 1.7])
+def test_a_shell_without_thickness_is_a_number_and_has_a_slope(sigma, radius):
+    distance = torch.arange(0.0, 9.0) ** 2
+    width = torch.tensor(sigma, requires_grad=True)
+    r = torch.tensor(radius, requires_grad=True)
+    shell = gaussian_shell(distance, r**2, width)
+    # What is left of it: the places at exactly its radius.
+    assert shell.tolist() == (distance == r.detach() ** 2).float().tolist()
+    for slope in torch.autograd.grad(shell.sum(), [width, r]):
+        assert slope.item() == 0.0

@@ -66,3 +66,34 @@ def test_a_range_counts_as_reproduced_inside_and_not_outside(results: Results, t
         number = Published(low=10, high=high, place="5.1.2", what="height")
         told = thesis.model_copy(update={"numbers": {**thesis.numbers, "towers.height": number}})
         assert row(compare(results, told), "towers.height")["verdict"] == verdict
+
+
+def test_what_studies_say_by_themselves_stands_beside_the_thesis(results: Results, thesis: Thesis):
+    told = {
+        "starts": StudySettings(
+            name="starts", title="t", place="5.2.6", asks="?", seeds=(0, 1, 2, 3),
+            variants=({"name": "CNN", "thesis": "starts.cnn"},),
+        ),
+        "epochs": StudySettings(
+            name="epochs", title="t", place="5.3.4", asks="?", seeds=(0, 1, 2, 3),
+            vary={"training.epochs": (10, 25, 50)},
+        ),
+    }  # fmt: skip
+    # Spread 0.02 over four seeds: the error of a difference is 0.014, so 0.48 is as good as 0.5.
+    scores = {"CNN": 0.1, "epochs 10": 0.2, "epochs 25": 0.48, "epochs 50": 0.5}
+    for name, study in told.items():
+        rows = [
+            dict.fromkeys(COLUMNS, 0.5)
+            | {"variant": v.name, "seed": s, "alive": s == 0}
+            | {"f05": scores[v.name] + (0.0173 if s % 2 else -0.0173)}
+            for v in study.all_variants()
+            for s in study.seeds
+        ]
+        folder = results.folder / "studies" / name
+        folder.mkdir(parents=True)
+        pd.DataFrame(rows).to_csv(folder / "runs.csv", index=False)
+    frame = compare(replace(results, studies=list(told.values())), thesis)
+    assert row(frame, "starts.cnn.alive_share")["ours"] == 25
+    assert row(frame, "starts.cnn.alive_share")["verdict"] == "better"
+    assert row(frame, "protocol.epochs_needed")["ours"] == 25
+    assert row(frame, "protocol.epochs_needed")["verdict"] == "not"

@@ -106,6 +106,7 @@ def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: T
     study = StudySettings(
         name="ablations", title="Which operators?", place="Table 5.5", asks="What does it need?",
         seeds=(0, 1), variants=({"name": "E", "thesis": "ablation.e"}, {"name": "A"}),
+        thesis_says="one of each is best.",
     )  # fmt: skip
     rows = [dict.fromkeys(COLUMNS, 0.5) | {"variant": v, "seed": s, "precision": 0.3 + s / 10}
             for v in "EA" for s in (0, 1)]  # fmt: skip
@@ -119,7 +120,9 @@ def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: T
     write_report(studied, thesis, page)
     found = read(page)
     assert "studies" in [section["id"] for section in found.all("section")]
-    for said in ("Which operators?", "What does it need?", "0.35 ± 0.07", "0.68"):
+    shown = ["Which operators?", "What does it need?", "0.35 ± 0.07", "0.68"]
+    concluded = ["Best here: E with an F0.5 of 0.50", "The thesis: one of each is best."]
+    for said in shown + concluded:
         assert said in found.text
     assert any("E: precision 0.35" in (image["alt"] or "") for image in found.all("img"))
 

@@ -308,7 +308,7 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(set
         name="ablations", title="t", place="Table 5.5", asks="Which?", seeds=(0, 1),
         variants=({"name": "A", "changes": {"geneos": ["cylinder"]}}, {"name": "E"}),
     )  # fmt: skip
-    one = dict.fromkeys(COLUMNS, 0.5)
+    one = dict.fromkeys(COLUMNS, 0.5) | {"kind": "cnn", "lowest_weight": float("nan")}
     rows = [one | {"variant": v, "seed": s, "f05": 0.2 + s / 10} for v in "AE" for s in (0, 1)]
     table = pd.DataFrame(rows)
     own = experiment_of(settings, study.name)
@@ -324,6 +324,8 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(set
     assert logged["A, seed 1"].metrics["test_f05"] == pytest.approx(0.3)
     assert logged["A, seed 1"].params["geneos"] == '["cylinder"]'
     assert logged["E"].tags["study"] == "ablations"
+    assert {logged[name].tags["kind"] for name in ("E", "A, seed 1")} == {"cnn"}
+    assert "lowest_weight" not in logged["E"].metrics  # a CNN has none
     again = log_runs(own, groups, tmp_path / "runs.json")
     assert {run["status"] for run in again["runs"].values()} == {"kept"}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 import pytest
+import torch
 
 from scenenet.crops import CropSettings, cut_crops
 from scenenet.protocol import ModelSettings, TrainingSettings
@@ -81,6 +82,7 @@ def test_changes_go_where_they_belong_and_common_ones_to_all():
         ({"split.train": 0.9}, "sum to 1"),
         ({"applied.tau": 0.5}, "applied.tau"),
         ({"voxels.resolution": 48}, "resolution"),
+        ({"kind": "cnn", "training.init": "unranged"}, "a CNN has no ranges"),
     ],
 )
 def test_a_change_that_cannot_be_is_named(changes, named):
@@ -88,8 +90,41 @@ def test_a_change_that_cannot_be_is_named(changes, named):
         study(variants=[{"name": "wrong", "changes": changes}]).plans(MODEL, GRID, SPLIT)
 
 
-def test_either_variants_or_vary():
-    with pytest.raises(ValueError, match="either"):
+def test_a_reference_may_stand_before_the_combinations():
+    told = study(
+        variants=[{"name": "none"}],
+        vary={"training.decay": (0.05, 0.25), "training.decay_every": (10, 20)},
+    )
+    plans = told.plans(MODEL, GRID, SPLIT)
+    assert [plan.name for plan in plans] == [
+        "none", "decay 0.05, decay_every 10", "decay 0.05, decay_every 20",
+        "decay 0.25, decay_every 10", "decay 0.25, decay_every 20",
+    ]  # fmt: skip
+    assert [plan.model.training.decay for plan in plans] == [0.0, 0.05, 0.05, 0.25, 0.25]
+    assert not told.is_grid
+    assert study(vary=told.vary).is_grid
+
+
+def test_small_numbers_are_written_out():
+    told = study(vary={"training.loss.epsilon": (0.00001, 0.1), "training.loss.alpha": (5, 0.001)})
+    names = [variant.name for variant in told.all_variants()]
+    assert names[:2] == ["epsilon 0.00001, alpha 5", "epsilon 0.00001, alpha 0.001"]
+
+
+def test_another_architecture_or_protocol_is_a_change_as_any_other():
+    told = study(
+        variants=[
+            {"name": "cnn", "changes": {"kind": "cnn", "training.init": "field"}},
+            {"name": "metres", "changes": {"protocol": "field", "search.searches": 1}},
+        ]
+    )
+    cnn, metres = (plan.model for plan in told.plans(MODEL, GRID, SPLIT))
+    assert (cnn.kind, cnn.training.init, cnn.training.epochs) == ("cnn", "field", 2)
+    assert (metres.kind, metres.protocol, metres.search.searches) == ("scenenet", "field", 1)
+
+
+def test_without_variants_there_is_nothing_to_do():
+    with pytest.raises(ValueError, match="give variants, or vary, or both"):
         study()
     with pytest.raises(ValueError, match="more than once"):
         study(variants=[{"name": "a"}, {"name": "a"}])
@@ -121,6 +156,38 @@ def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
     assert scores["f05"].nunique() > 1
 
 
+def test_models_of_other_kinds_are_trained_and_scored_beside(crops, tmp_path):
+    told = study(
+        seeds=(0,),
+        variants=[
+            {"name": "ranges"},
+            {"name": "none", "changes": {"training.init": "unranged"}},
+            {"name": "cnn", "changes": {"kind": "cnn"}},
+            {
+                "name": "metres",
+                "changes": {
+                    "protocol": "field", "search.searches": 1, "search.trial": 1,
+                    "search.starts": 8, "search.generations": 1, "search.population": 4,
+                },
+            },
+        ],
+    )  # fmt: skip
+    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    rows = {row["variant"]: row for row in table.to_dict("records")}
+    assert {name: row["kind"] for name, row in rows.items()} == {
+        "ranges": "scenenet", "none": "scenenet", "cnn": "cnn", "metres": "scenenet",
+    }  # fmt: skip
+    assert rows["cnn"]["parameters"] == 3 * (5 * 5 * 5 + 1)
+    assert pd.isna(rows["cnn"]["lowest_weight"])
+    assert pd.isna(rows["cnn"]["lowest_shape"])
+    # Two steps of 0.01 leave numbers from positive ranges positive, and those of N(0, 1) mixed.
+    assert rows["ranges"]["lowest_shape"] > 0
+    drawn = torch.randn(11, generator=torch.Generator().manual_seed(0))
+    assert rows["none"]["lowest_shape"] == pytest.approx(drawn[:9].min().item(), abs=0.3)
+    # In metres numbers are positive by construction.
+    assert min(rows["metres"]["lowest_weight"], rows["metres"]["lowest_shape"]) > 0
+
+
 def test_the_summary_is_over_seeds_with_the_thesis_beside():
     told = study(variants=[{"name": "a", "thesis": "ablation.a"}, {"name": "b"}])
     runs = pd.DataFrame(
@@ -137,5 +204,28 @@ def test_the_summary_is_over_seeds_with_the_thesis_beside():
     assert a["f05"] == pytest.approx(0.3)
     assert a["f05_std"] == pytest.approx(0.141421, abs=1e-6)
     assert (a["live_share"], b["live_share"]) == (1.0, 0.5)
+    assert (a["alive"], b["alive"]) == (2, 1)
     assert a["thesis_precision"] == 0.5
     assert pd.isna(b["thesis_precision"])
+
+
+def test_negative_numbers_are_counted_by_seed():
+    told = study(variants=[{"name": name} for name in ("a", "b", "cnn")], seeds=(0, 1, 2, 3))
+    lowest = {
+        "a": ([0.1, -0.1, 0.2, 0.3], [0.5, 0.5, 0.5, -0.2]),  # by weight, by shape
+        "b": ([0.1, 0.1, 0.2, 0.3], [0.5, 0.4, 0.0, 0.2]),
+        "cnn": ([float("nan")] * 4, [float("nan")] * 4),
+    }
+    runs = pd.DataFrame(
+        [
+            dict.fromkeys(COLUMNS, 0.5)
+            | {"variant": v, "seed": s, "alive": True}
+            | {"lowest_weight": weights[s], "lowest_shape": shapes[s]}
+            for v, (weights, shapes) in lowest.items()
+            for s in range(4)
+        ]
+    )
+    a, b, cnn = summarise(told, runs, Thesis(source="s", numbers={})).to_dict("records")
+    assert (a["negative_share"], b["negative_share"]) == (0.5, 0.0)
+    assert (a["lowest_weight"], a["lowest_shape"]) == (-0.1, -0.2)
+    assert pd.isna(cnn["negative_share"])

@@ -37,11 +37,16 @@ STUDIES = {
     "kernel-after-training": "Table 5.4",
     "resolution-after-training": "5.2.7, Figure 5.10",
     "measurement": "5.3.2",
+    "fidelity": "5.3.3",
+    "penalty": "5.3.3, Figure 4.5",
     "alpha-epsilon": "5.3.3",
     "epochs": "5.3.4",
     "batch-size": "5.3.4",
     "learning-rate": "5.3.4",
+    "decay": "5.3.4",
     "kernel-in-training": "5.3.4",
+    "initialisation": "5.3.4",
+    "starts": "5.2.6",
     "optimiser": "5.3.4",
     "split": "5.3.4",
 }
@@ -77,7 +82,38 @@ def test_every_study_of_the_thesis_is_in_the_configuration(project_root):
     assert {study["name"]: study["place"] for study in told} == STUDIES
 
 
-def test_the_grid_of_alpha_and_epsilon_has_the_combinations_that_the_thesis_lists(project_root):
+LISTED = {
+    "alpha-epsilon": {
+        "training.loss.alpha": [0.001, 0.1, 1, 2, 3, 5, 8, 10, 20, 50, 100],
+        "training.loss.epsilon": [0.00001, 0.0001, 0.001, 0.01],
+    },
+    "epochs": {"training.epochs": [10, 25, 50, 100, 500, 1000]},
+    "batch-size": {"training.batch_size": [2, 4, 8, 16, 24, 32]},
+    "learning-rate": {"training.learning_rate": [0.1, 0.001, 0.0001, 0.00001]},
+    "decay": {"training.decay": [0.05, 0.1, 0.2, 0.25], "training.decay_every": [10, 20, 25]},
+    "kernel-in-training": {
+        "kernel_size": [[6, 5, 5], [6, 6, 6], [9, 5, 5], [9, 6, 6], [8, 8, 8], [9, 9, 9]]
+    },
+    "optimiser": {"training.optimiser": ["sgd", "adam", "rmsprop"]},
+}
+"""Values that the thesis lists in 5.3.3 and 5.3.4."""
+ADDED = {"alpha-epsilon": [0.1], "learning-rate": [0.01]}
+"""What is tried besides: the epsilon of 5.2.1, and the rate that we use."""
+
+
+@pytest.mark.parametrize("name", LISTED)
+def test_a_study_varies_what_the_thesis_lists(project_root, name):
+    told = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
+    (vary,) = [study["vary"] for study in told if study["name"] == name]
+    assert vary.keys() == LISTED[name].keys()
+    for setting, listed in LISTED[name].items():
+        missing = [value for value in listed if value not in vary[setting]]
+        more = [value for value in vary[setting] if value not in listed]
+        assert not missing
+        assert set(map(str, more)) <= set(map(str, ADDED.get(name, [])))
+
+
+def test_alpha_and_epsilon_make_the_55_combinations_that_the_thesis_counts(project_root):
     told = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
     (grid,) = [study["vary"] for study in told if study["name"] == "alpha-epsilon"]
-    assert [len(values) for values in grid.values()] == [11, 4]
+    assert [len(values) for values in grid.values()] == [11, 5]

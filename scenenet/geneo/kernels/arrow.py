@@ -8,7 +8,14 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
-from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, gaussian_shell, zero_sum
+from scenenet.geneo.kernel import (
+    BASE,
+    GeneoKernel,
+    Lattice,
+    ShapeParameter,
+    gaussian_shell,
+    zero_sum,
+)
 from scenenet.geneo.registry import register
 
 CONE_SHARE = 1 / 3
@@ -27,7 +34,7 @@ class Arrow(GeneoKernel):
 
     name = "arrow"
     parameters = (
-        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5)),
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5), BASE),
         ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around both radii", (0.15, 2.25)),
         ShapeParameter(
             "r_c", 0.5, 3.0, "voxel", "reach of the tower's head, where the lines meet", (0.3, 1.5)

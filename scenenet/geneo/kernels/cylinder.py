@@ -6,7 +6,14 @@ from collections.abc import Mapping
 
 from torch import Tensor
 
-from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, gaussian_shell, zero_sum
+from scenenet.geneo.kernel import (
+    BASE,
+    GeneoKernel,
+    Lattice,
+    ShapeParameter,
+    gaussian_shell,
+    zero_sum,
+)
 from scenenet.geneo.registry import register
 
 
@@ -16,7 +23,7 @@ class Cylinder(GeneoKernel):
 
     name = "cylinder"
     parameters = (
-        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5)),
+        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5), BASE),
         ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius", (0.15, 2.25)),
     )
 

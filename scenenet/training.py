@@ -35,6 +35,10 @@ EVALUATED_AT_ONCE = 8
 OPTIMISERS = {"rmsprop": torch.optim.RMSprop, "adam": torch.optim.Adam, "sgd": torch.optim.SGD}
 
 
+class LostTraining(InputError):
+    """The loss became something that is not a number."""
+
+
 def train(
     voxel_manifests: Sequence[str | Path],
     split: str | Path,
@@ -115,6 +119,7 @@ def fit(
 
     Raises:
         InputError: there is nothing to train on, or no GPU where one is asked for.
+        LostTraining: the numbers ran away; a lower learning rate may keep them.
     """
     if not any(sample.tower.any() for sample in training):
         raise InputError(
@@ -145,7 +150,7 @@ def fit(
         row = _epoch(model, optimiser, training, settings, weights, [seed, epoch])
         row["seconds"] = time.perf_counter() - started
         if not np.isfinite(row["loss"]):
-            raise InputError(
+            raise LostTraining(
                 f"training {settings.name} from seed {seed} lost its way: the loss of epoch "
                 f"{epoch} is {row['loss']}",
                 remedy="Set a lower training.learning_rate",

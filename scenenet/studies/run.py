@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,13 +15,13 @@ from scenenet.batches import batch
 from scenenet.crops import read_crops
 from scenenet.errors import InputError
 from scenenet.files import atomic
-from scenenet.metrics import ThresholdCurve
-from scenenet.models import SceneNet, VoxelModel
+from scenenet.metrics import Confusion, ThresholdCurve
+from scenenet.models import SceneNet, VoxelModel, new_model
 from scenenet.progress import track
 from scenenet.protocol import ModelSettings
 from scenenet.split import SplitSettings, split_crops
 from scenenet.studies.settings import Plan, StudySettings
-from scenenet.training import fit, threshold_curve
+from scenenet.training import LostTraining, fit, threshold_curve
 from scenenet.voxels import VoxelSample, VoxelSettings, voxelise
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ COLUMNS = (
     "average_precision", "validation_f05", "training_crops", "parameters", "epochs", "loss",
     "lowest_weight", "lowest_shape", "training_seconds", "inference_ms",
 )  # fmt: skip
+
+LOWEST = ("lowest_weight", "lowest_shape")
 
 
 def run_study(
@@ -44,7 +47,8 @@ def run_study(
     """Train and score every variant from every seed, and write a row for each.
 
     tau is chosen on the validation crops, as the variant is scored: after ``applied`` changes.
-    Variants that differ only in those share their trainings.
+    Variants that differ only in those share their trainings. A training that loses its way ends
+    with a model that finds nothing: its row is that of a dead one, without a loss.
 
     Args:
         crop_manifests: of the crop stores.
@@ -62,7 +66,7 @@ def run_study(
     import pandas as pd
 
     data = _Crops(crop_manifests)
-    trained: dict[Any, tuple[VoxelModel, dict[str, Any]]] = {}
+    trained: dict[Any, tuple[VoxelModel | None, dict[str, Any]]] = {}
     rows = []
     plans = [(plan, seed) for plan in study.plans(model, voxels, split) for seed in study.seeds]
     for plan, seed in track(plans, f"study {study.name}: trainings"):
@@ -75,7 +79,10 @@ def run_study(
         validation = data.samples(plan.applied_voxels, parts["validation"])
         scored = data.samples(plan.applied_voxels, parts[study.part])
         row = {"variant": plan.name, "seed": seed, **facts}
-        rows.append(row | _scores(_applied(result, plan), plan, validation, scored))
+        if result is None:
+            rows.append(row | _nothing_found(scored))
+        else:
+            rows.append(row | _scores(_applied(result, plan), plan, validation, scored))
     table = pd.DataFrame(rows)[list(COLUMNS)]
     with atomic(out) as partial:
         table.to_csv(partial, index=False, float_format="%.6g")
@@ -112,28 +119,32 @@ class _Crops:
 
 def _trained(
     training: Sequence[VoxelSample], settings: ModelSettings, seed: int
-) -> tuple[VoxelModel, dict[str, Any]]:
+) -> tuple[VoxelModel | None, dict[str, Any]]:
+    """The model, None where its training lost its way, and what is known of the training."""
     begin = time.perf_counter()
-    model, history = fit(training, [], settings, seed)
+    try:
+        model, history = fit(training, [], settings, seed)
+        found = {"epochs": len(history), "loss": float(history["loss"].iloc[-1]), **_lowest(model)}
+    except LostTraining as error:
+        print(error, file=sys.stderr)
+        model, found = None, dict.fromkeys(("epochs", "loss", *LOWEST), math.nan)
     return model, {
-        "kind": model.kind,
-        **_lowest(model),
+        "kind": settings.kind,
         "training_crops": len(training),
-        "parameters": model.n_parameters(),
-        "epochs": len(history),
-        "loss": float(history["loss"].iloc[-1]),
+        "parameters": (model or new_model(settings, seed)).n_parameters(),
         "training_seconds": time.perf_counter() - begin,
+        **found,
     }
 
 
 def _lowest(model: VoxelModel) -> dict[str, float]:
     """Below zero they break the convexity that the loss is to keep (thesis 4.5, 5.3.3)."""
     if not isinstance(model, SceneNet):
-        return {"lowest_weight": math.nan, "lowest_shape": math.nan}
+        return dict.fromkeys(LOWEST, math.nan)
     numbers = model.shape_parameters()
     mixing = [value for name, value in numbers.items() if name.startswith("lambda.")]
     shapes = [value for name, value in numbers.items() if not name.startswith("lambda.")]
-    return {"lowest_weight": min(mixing), "lowest_shape": min(shapes)}
+    return dict(zip(LOWEST, (min(mixing), min(shapes)), strict=True))
 
 
 def _applied(model: VoxelModel, plan: Plan) -> VoxelModel:
@@ -144,6 +155,14 @@ def _applied(model: VoxelModel, plan: Plan) -> VoxelModel:
             f"{plan.name}: a {model.kind} has no other kernel size than the one it was trained with"
         )
     return model.with_kernel_size(plan.applied_size)
+
+
+def _nothing_found(scored: Sequence[VoxelSample]) -> dict[str, Any]:
+    n_tower = sum(int(sample.tower.sum()) for sample in scored)
+    n_voxels = sum(sample.grid.n_voxels for sample in scored)
+    unknown = dict.fromkeys(("tau", "inference_ms"), math.nan)
+    zero = {"average_precision": 0.0, "validation_f05": 0.0, "alive": False}
+    return Confusion(fn=n_tower, tn=n_voxels - n_tower).scores() | unknown | zero
 
 
 def _scores(

@@ -188,6 +188,22 @@ def test_models_of_other_kinds_are_trained_and_scored_beside(crops, tmp_path):
     assert min(rows["metres"]["lowest_weight"], rows["metres"]["lowest_shape"]) > 0
 
 
+def test_a_training_that_loses_its_way_is_a_dead_one_and_the_others_go_on(crops, tmp_path):
+    lost = {"training.learning_rate": 1e30, "training.optimiser": "sgd", "training.epochs": 4}
+    told = study(variants=[{"name": "lost", "changes": lost}, {"name": "kept"}])
+    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    gone = table[table["variant"] == "lost"]
+    assert len(table) == 4
+    assert gone["loss"].isna().all()
+    assert not gone["alive"].any()
+    assert (gone[["precision", "recall", "f05"]] == 0).all(axis=None)
+    assert gone["miou"].between(0.49, 0.5).all()
+    assert (gone["parameters"] == 11).all()
+    assert table.loc[table["variant"] == "kept", "loss"].notna().all()
+    lost_row, _ = summarise(told, table, Thesis(source="s", numbers={})).to_dict("records")
+    assert (lost_row["alive"], lost_row["f05"]) == (0, 0.0)
+
+
 def test_the_summary_is_over_seeds_with_the_thesis_beside():
     told = study(variants=[{"name": "a", "thesis": "ablation.a"}, {"name": "b"}])
     runs = pd.DataFrame(

@@ -10,8 +10,8 @@ from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any
 
 from scenenet.files import digest
-from scenenet.results import Results, SeedResult
-from scenenet.tracking.runs import RunGroup, RunRecord
+from scenenet.results import BLACK_BOX, Results, SeedResult
+from scenenet.tracking.runs import NOTE_TAG, RunGroup, RunRecord
 
 if TYPE_CHECKING:
     from scenenet.figures import Picture
@@ -28,7 +28,7 @@ def model_groups(
     pictures: Sequence[Picture] = (),
     study: str = "reproduction",
 ) -> list[RunGroup]:
-    """One parent per model with a run per seed under it.
+    """One parent per model, the black box among them, with a run per seed under it.
 
     Args:
         results: the result folder.
@@ -40,15 +40,15 @@ def model_groups(
     """
     base = {"study": study, "dataset": dataset, "protocol": protocol}
     groups = []
-    for model in results.models:
-        trained = results.of_model(model)
+    trainings = {model: results.of_model(model) for model in results.models}
+    for model, trained in (trainings | {BLACK_BOX: results.black_box}).items():
         if not trained:
             continue
         own = (settings or {}).get(model, {})
         key = f"{study}/{dataset}/{model}"
         children = [_seed_record(result, key, base, own) for result in trained]
         shown = [picture for picture in pictures if model in picture.models]
-        champion = results.champion(model)
+        champion = results.champion(model) if model in trainings else None
         parent = _parent_record(trained, champion, key, base, children, shown)
         groups.append(RunGroup(parent, children))
     return groups
@@ -85,7 +85,7 @@ def _seed_record(
             "kind": result.kind,
             "seed": str(result.seed),
             "alive": str(result.alive).lower(),
-            **_origin_tags(provenance),
+            **origin_tags(provenance),
         },
         artifacts={f"model/{path.name}": path for path in result.model_files},
         drawings=_drawings(result),
@@ -93,8 +93,8 @@ def _seed_record(
     )
 
 
-def _origin_tags(provenance: Mapping[str, Any]) -> dict[str, str]:
-    """Config hash, data fingerprint and code version of a training."""
+def origin_tags(provenance: Mapping[str, Any]) -> dict[str, str]:
+    """Config hash, data fingerprint and code version, from the record of a training or a study."""
     if not provenance:
         return {}
     return {
@@ -115,11 +115,13 @@ def _history(result: SeedResult) -> tuple[dict[str, list[float]], list[int]]:
 
 def _final_metrics(result: SeedResult) -> dict[str, float | None]:
     test, towers = result.evaluation["voxel"], result.evaluation["towers"]
-    metrics: dict[str, float | None] = {"tau": test.get("tau"), "alive": float(result.alive)}
-    metrics |= {f"validation_{n}": result.validation[n] for n in SCORES if n in result.validation}
-    metrics |= {f"test_{name}": test[name] for name in SCORES}
+    # MLflow's plots begin with the first: it is the one that the thesis chooses by.
+    scores = sorted(SCORES, key=lambda name: name != "f05")
+    metrics: dict[str, float | None] = {f"test_{name}": test[name] for name in scores}
     metrics["test_average_precision"] = result.evaluation.get("average_precision")
+    metrics |= {f"validation_{n}": result.validation[n] for n in scores if n in result.validation}
     metrics |= {f"towers_{name}": towers[name] for name in TOWER_SCORES}
+    metrics |= {"tau": test.get("tau"), "alive": float(result.alive)}
     return metrics
 
 
@@ -159,16 +161,14 @@ def _parent_record(
     the means; ``test_f05_live_mean`` and the like leave them out.
     """
     live = [child for child, result in zip(children, trained, strict=True) if result.alive]
-    metrics: dict[str, float | None] = {
-        "seeds": len(trained),
-        "alive_share": len(live) / len(trained),
-    }
+    metrics: dict[str, float | None] = {}
     for name in children[0].metrics:
         if name == "alive":
             continue
         metrics |= _summary(name, children)
         if name.startswith("test_"):
             metrics |= _summary(f"{name}_live", live, of=name)
+    metrics |= {"seeds": len(trained), "alive_share": len(live) / len(trained)}
     for name in SCORES:
         metrics[f"trivial_{name}"] = fmean(r.evaluation["voxel_trivial"][name] for r in trained)
     if champion is not None:
@@ -189,7 +189,7 @@ def _parent_record(
             **base,
             "model": model,
             "kind": trained[0].kind,
-            "mlflow.note.content": _note(trained, len(live)),
+            NOTE_TAG: _note(trained, len(live)),
         },
         artifacts={f"figures/{picture.file.name}": picture.file for picture in pictures},
         seconds=sum(result.seconds or 0.0 for result in trained),

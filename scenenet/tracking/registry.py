@@ -1,4 +1,4 @@
-"""The best seed of each model in MLflow's registry, under the alias ``champion``."""
+"""The best of each model, and of all, in MLflow's registry under the alias ``champion``."""
 
 from __future__ import annotations
 
@@ -27,14 +27,16 @@ DIGEST_TAG = "scenenet.digest"
 def register_champions(
     settings: TrackingSettings, results: Results, dataset: str, runs: str | Path, record: str | Path
 ) -> dict[str, Any]:
-    """Register the seed of each model that is best on validation.
+    """Register the seed of each model that is best on validation, and the best of all models.
 
-    A model of the registry is called ``EXPERIMENT-MODEL``. Another champion becomes a new version,
-    and the alias moves to it; the same one stays as it is. Older versions are kept.
+    The registry calls a model ``EXPERIMENT-MODEL``, and the best of all ``EXPERIMENT``. Another
+    champion becomes a new version, and the alias moves to it; the same one stays as it is. Older
+    versions are kept.
 
     Args:
         runs: record of ``log_runs``, to find the run of each seed.
-        record: JSON file to write: model -> version, run, seed and address to load it by.
+        record: JSON file to write: name in the registry -> model, seed, version, run, and the
+            address to load it by.
 
     Returns:
         what was written.
@@ -46,28 +48,37 @@ def register_champions(
     registered: dict[str, Any] = {}
     with exclusive(settings.uri), store_errors(settings.uri):
         client = open_client(settings.uri)
-        for model in results.models:
-            champion = results.champion(model)
-            if champion is None:
-                continue
-            key = f"reproduction/{dataset}/{model}/seed-{champion.seed}"
+        for name, champion in _champions(settings.experiment, results).items():
+            key = f"reproduction/{dataset}/{champion.model}/seed-{champion.seed}"
             if key not in logged:
                 raise InputError(
-                    f"{model} seed {champion.seed} has no run",
+                    f"{champion.model} seed {champion.seed} has no run",
                     file=runs,
                     remedy="Delete the record and run the workflow again",
                 )
-            name = f"{settings.experiment}-{model}"
             version = _registered(client, name, champion, logged[key]["run_id"])
-            registered[model] = {
-                "name": name,
-                "version": version.version,
+            registered[name] = {
+                "model": champion.model,
                 "seed": champion.seed,
+                "version": version.version,
                 "run_id": logged[key]["run_id"],
                 "load": f"models:/{name}@{ALIAS}",
             }
     files.write_json(record, registered)
     return registered
+
+
+def _champions(experiment: str, results: Results) -> dict[str, SeedResult]:
+    """Name in the registry -> the training that is best on validation."""
+    champions = {
+        f"{experiment}-{model}": best
+        for model in results.models
+        if (best := results.champion(model)) is not None
+    }
+    if champions:
+        best = max(champions.values(), key=lambda champion: champion.validation["f05"])
+        champions[experiment] = best
+    return champions
 
 
 def _registered(client: MlflowClient, name: str, champion: SeedResult, run_id: str) -> ModelVersion:
@@ -78,7 +89,7 @@ def _registered(client: MlflowClient, name: str, champion: SeedResult, run_id: s
     try:
         client.get_registered_model(name)
     except MlflowException:
-        client.create_registered_model(name, tags={"model": champion.model}, description=_said())
+        client.create_registered_model(name, description=_said())
     else:
         aliases = client.get_registered_model(name).aliases
         if ALIAS in aliases:
@@ -115,6 +126,7 @@ def _save(folder: Path, champion: SeedResult) -> None:
 
 def _tags(champion: SeedResult) -> Mapping[str, str]:
     return {
+        "model": champion.model,
         "seed": str(champion.seed),
         "validation_f05": f"{champion.validation['f05']:.4f}",
         "tau": f"{champion.validation['tau']:.6g}",
@@ -124,5 +136,5 @@ def _tags(champion: SeedResult) -> Mapping[str, str]:
 def _said() -> str:
     return (
         "Probability of each voxel of a batch of grids (B, D, H, W) to hold a tower. The version "
-        f"called {ALIAS} is the seed with the highest F0.5 on validation."
+        f"called {ALIAS} is the training with the highest F0.5 on validation; its tags say which."
     )

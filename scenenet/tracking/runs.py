@@ -30,6 +30,9 @@ if TYPE_CHECKING:
     from mlflow.entities import Run
 
 KEY_TAG, GROUP_TAG, DIGEST_TAG = "scenenet.key", "scenenet.group", "scenenet.digest"
+NOTE_TAG = "mlflow.note.content"
+"""Where MLflow keeps the description of a run or of an experiment."""
+
 METRICS_PER_BATCH, PARAMS_PER_BATCH = 1000, 100
 """What MLflow takes in one call."""
 
@@ -92,6 +95,7 @@ def log_runs(
     groups: Sequence[RunGroup],
     record: str | Path,
     store: str | Path | None = None,
+    note: str = "",
 ) -> dict[str, Any]:
     """Bring the runs of ``groups`` into the store; what is there unchanged is not touched.
 
@@ -103,6 +107,7 @@ def log_runs(
         groups: what to log.
         record: JSON file to write: key -> run id, digest and whether it was logged or kept.
         store: the record that ``create_store`` wrote; checked against the store if given.
+        note: what the experiment says of itself.
 
     Returns:
         what was written.
@@ -122,6 +127,8 @@ def log_runs(
                 f"the MLflow store {settings.uri} has no experiment {settings.experiment!r}",
                 remedy="Make the store first (rule mlflow_store)",
             )
+        if note and experiment.tags.get(NOTE_TAG) != note:
+            client.set_experiment_tag(experiment.experiment_id, NOTE_TAG, note)
         for group in groups:
             runs |= _log_group(client, experiment.experiment_id, group)
     written = {"uri": settings.uri, "experiment": settings.experiment, "runs": runs}
@@ -185,17 +192,18 @@ def _log(
     run_id = client.create_run(experiment, start, tags, record.name).info.run_id
 
     last = max(record.epochs, default=0)
+    # At step 0: MLflow shows the value with the highest step, and there is no other one. They come
+    # before the history, because the plots of its comparison begin with the first metric.
     metrics = [
+        Metric(name, float(value), end, 0)
+        for name, value in record.metrics.items()
+        if value is not None and value == value
+    ]
+    metrics += [
         Metric(name, float(value), start + (end - start) * epoch // max(1, last), int(epoch))
         for name, values in record.history.items()
         for epoch, value in zip(record.epochs, values, strict=True)
         if value == value
-    ]
-    # At step 0: MLflow shows the value with the highest step, and there is no other one.
-    metrics += [
-        Metric(name, float(value), end, 0)
-        for name, value in record.metrics.items()
-        if value is not None and value == value
     ]
     params = [Param(name, str(value)) for name, value in record.params.items()]
     for i in range(0, len(metrics), METRICS_PER_BATCH):

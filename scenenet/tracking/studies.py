@@ -9,16 +9,22 @@ from typing import TYPE_CHECKING, Any
 
 from scenenet.studies.settings import StudySettings
 from scenenet.studies.summary import SCORES
-from scenenet.tracking.runs import RunGroup, RunRecord
+from scenenet.tracking.records import origin_tags
+from scenenet.tracking.runs import NOTE_TAG, RunGroup, RunRecord
 from scenenet.tracking.store import TrackingSettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from scenenet.figures import Picture
+
 FACTS = (
     "tau", "alive", "training_crops", "parameters", "epochs", "loss", "training_seconds",
     "inference_ms", "lowest_weight", "lowest_shape",
 )  # fmt: skip
+
+GIVEN = ("training_crops", "parameters", "epochs")
+"""Facts that a variant sets, so that they have no spread."""
 
 
 def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
@@ -26,14 +32,36 @@ def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
     return settings.model_copy(update={"experiment": f"{settings.experiment}-{study}"})
 
 
-def study_groups(study: StudySettings, runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
+def note_of(study: StudySettings) -> str:
+    """What the experiment of a study says of itself."""
+    return f"{study.title}. {study.asks} Thesis {study.place}; scores on the {study.part} crops."
+
+
+def study_groups(
+    study: StudySettings,
+    runs: pd.DataFrame,
+    dataset: str,
+    protocol: str = "",
+    provenance: Mapping[str, Any] | None = None,
+    pictures: Sequence[Picture] = (),
+) -> list[RunGroup]:
     """The runs of a study.
 
     Args:
         runs: of ``scenenet.studies.run``, a row per variant and seed.
         dataset: name of the data, part of every key, so that runs on other data stand beside.
+        protocol: how the data were split and voxelised, in words, for a tag.
+        provenance: what the study was made from and by, for tags.
+        pictures: figures of the whole study, attached to every variant.
     """
-    tags = {"study": study.name, "dataset": dataset, "place": study.place, "model": study.model}
+    tags = {
+        "study": study.name,
+        "dataset": dataset,
+        "protocol": protocol,
+        "place": study.place,
+        "model": study.model,
+        **origin_tags(provenance or {}),
+    }
     groups = []
     for variant in study.all_variants():
         rows = runs[runs["variant"] == variant.name].to_dict("records")
@@ -54,7 +82,12 @@ def study_groups(study: StudySettings, runs: pd.DataFrame, dataset: str) -> list
                 params=params | {"seed": row["seed"]},
                 metrics=_metrics(row, study.part),
                 tags=tags
-                | {"kind": str(row["kind"]), "variant": variant.name, "seed": str(row["seed"])},
+                | {
+                    "kind": str(row["kind"]),
+                    "variant": variant.name,
+                    "seed": str(row["seed"]),
+                    "alive": str(bool(row["alive"])).lower(),
+                },
                 seconds=float(row["training_seconds"]),
             )
             for row in rows
@@ -68,9 +101,9 @@ def study_groups(study: StudySettings, runs: pd.DataFrame, dataset: str) -> list
             | {
                 "kind": str(rows[0]["kind"]),
                 "variant": variant.name,
-                "mlflow.note.content": f"{study.asks} Mean over {len(rows)} seeds; thesis "
-                f"{study.place}.",
+                NOTE_TAG: f"{study.asks} Mean over {len(rows)} seeds; thesis {study.place}.",
             },
+            artifacts={f"figures/{picture.file.name}": picture.file for picture in pictures},
             seconds=sum(child.seconds for child in children),
         )
         groups.append(RunGroup(parent, children))
@@ -78,21 +111,21 @@ def study_groups(study: StudySettings, runs: pd.DataFrame, dataset: str) -> list
 
 
 def _metrics(row: Mapping[str, Any], part: str) -> dict[str, float | None]:
-    metrics: dict[str, float | None] = {name: float(row[name]) for name in FACTS}
-    for name in (*SCORES, "average_precision"):
-        metrics[f"{part}_{name}"] = float(row[name])
-    return metrics
+    # MLflow's plots begin with the first: it is the one that the thesis chooses by.
+    scores = sorted((*SCORES, "average_precision"), key=lambda name: name != "f05")
+    metrics: dict[str, float | None] = {f"{part}_{name}": float(row[name]) for name in scores}
+    return metrics | {name: float(row[name]) for name in FACTS}
 
 
 def _means(seeds: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:
     """Means under the names of the seeds' own metrics, so that both stand in one column."""
-    means: dict[str, float | None] = {"seeds": len(seeds)}
+    means: dict[str, float | None] = {}
     for name in seeds[0]:
         values = [v for seed in seeds if (v := seed[name]) is not None and not math.isnan(v)]
         if values:
             mean = sum(values) / len(values)
             means[name] = mean
-            if len(values) > 1:
+            if len(values) > 1 and name not in GIVEN:
                 square = sum((value - mean) ** 2 for value in values)
                 means[f"{name}_std"] = math.sqrt(square / (len(values) - 1))
-    return means
+    return means | {"seeds": len(seeds)}

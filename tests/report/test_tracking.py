@@ -21,7 +21,7 @@ from scenenet.convolution import Occupancy
 from scenenet.errors import InputError
 from scenenet.figures import draw_all, plan
 from scenenet.modelfile import read_model
-from scenenet.results import Results
+from scenenet.results import BLACK_BOX, Results, parameter_columns
 from scenenet.studies.run import COLUMNS
 from scenenet.studies.settings import StudySettings
 from scenenet.tracking import (
@@ -34,7 +34,7 @@ from scenenet.tracking import (
     store_id,
 )
 from scenenet.tracking.registry import register_champions
-from scenenet.tracking.studies import experiment_of, study_groups
+from scenenet.tracking.studies import experiment_of, note_of, study_groups
 
 
 @pytest.fixture(scope="session")
@@ -107,9 +107,12 @@ def test_every_epoch_of_loss_and_parameters_is_there(settings, client, results, 
     (run,) = runs(client)["scenenet seed 0"]
     history = client.get_metric_history(run.info.run_id, "loss")
     assert [(m.step, m.value) for m in history] == [(1, 1), (2, 0.5), (3, 1 / 3), (4, 0.25)]
-    expected = results.seed("scenenet", 0).history["arrow.r_c"]
-    radius = client.get_metric_history(run.info.run_id, "arrow.r_c")
-    assert [m.value for m in radius] == pytest.approx(list(expected))
+    history = results.seed("scenenet", 0).history
+    names = parameter_columns(history)
+    assert len(names) == 11 + 1  # the last weight is one minus the others
+    for name in names:
+        path = client.get_metric_history(run.info.run_id, name)
+        assert [(m.step, m.value) for m in path] == list(enumerate(history[name], start=1))
 
 
 def test_more_measures_than_mlflow_takes_at_once_are_all_logged(settings, client, tmp_path):
@@ -156,6 +159,20 @@ def test_a_parent_has_the_summary_of_the_runs_under_it(settings, client, results
     for seed in (0, 1):
         (child,) = runs(client)[f"cnn seed {seed}"]
         assert child.data.tags["mlflow.parentRunId"] == parent.info.run_id
+
+
+def test_the_black_box_stands_beside_the_models(settings, client, results, tmp_path):
+    told = json.loads((results.folder / "evaluate" / "scenenet" / "seed-1.json").read_text())
+    box = results.folder / "black_box" / "seed-1.json"
+    box.parent.mkdir()
+    box.write_text(json.dumps(told | {"model": BLACK_BOX}))
+    log(settings, results, tmp_path)
+    (parent,) = runs(client)["black box (corridors)"]
+    (seed,) = runs(client)["black box seed 1"]
+    assert seed.data.tags["mlflow.parentRunId"] == parent.info.run_id
+    assert seed.data.tags["kind"] == BLACK_BOX
+    assert parent.data.metrics["test_precision_mean"] == pytest.approx(0.6)
+    assert [a.path for a in client.list_artifacts(seed.info.run_id)] == ["figures"]
 
 
 def test_logging_again_keeps_every_run(settings, client, results, tmp_path):
@@ -303,7 +320,9 @@ def test_the_folder_store_mlflow_gave_up_is_refused(tmp_path):
         create_store(TrackingSettings(uri=str(tmp_path / "mlruns")), tmp_path / "store.json")
 
 
-def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(settings, tmp_path):
+def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(
+    settings, results, tmp_path
+):
     study = StudySettings(
         name="ablations", title="t", place="Table 5.5", asks="Which?", seeds=(0, 1),
         variants=({"name": "A", "changes": {"geneos": ["cylinder"]}}, {"name": "E"}),
@@ -313,8 +332,15 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(set
     table = pd.DataFrame(rows)
     own = experiment_of(settings, study.name)
     create_store(settings, tmp_path / "store.json", [own.experiment])
-    groups = study_groups(study, table, "toys")
-    written = log_runs(own, groups, tmp_path / "runs.json", tmp_path / "store.json")
+    runs_file = results.folder / "studies" / study.name / "runs.csv"
+    runs_file.parent.mkdir(parents=True)
+    table.to_csv(runs_file, index=False)
+    drawn = [d for d in plan(replace(results, studies=[study])) if d.section == "studies"]
+    pictures = draw_all(drawn, tmp_path / "figures")
+    made = {"config": "c0f19", "code": "c0de", "version": "0.1.0", "inputs": {"manifests": ["a"]}}
+    groups = study_groups(study, table, "toys", "20/10/70 by stretch", made, pictures)
+    note = note_of(study)
+    written = log_runs(own, groups, tmp_path / "runs.json", tmp_path / "store.json", note)
     assert len(written["runs"]) == 6
     client = MlflowClient(tracking_uri=settings.uri)
     experiment = client.get_experiment_by_name("scenenet-ablations")
@@ -323,9 +349,20 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(set
     assert logged["A"].metrics["test_f05_std"] == pytest.approx(0.0707107)
     assert logged["A, seed 1"].metrics["test_f05"] == pytest.approx(0.3)
     assert logged["A, seed 1"].params["geneos"] == '["cylinder"]'
-    assert logged["E"].tags["study"] == "ablations"
     assert {logged[name].tags["kind"] for name in ("E", "A, seed 1")} == {"cnn"}
     assert "lowest_weight" not in logged["E"].metrics  # a CNN has none
+    assert "test_f05_std" in logged["A"].metrics and "epochs_std" not in logged["A"].metrics
+    for name, seed in (("E", None), ("E, seed 0", "0")):
+        tags = logged[name].tags
+        assert (tags["study"], tags["model"], tags["dataset"]) == ("ablations", "scenenet", "toys")
+        assert (tags["protocol"], tags["variant"]) == ("20/10/70 by stretch", "E")
+        assert tags["scenenet.code"] == "c0de" and tags["scenenet.data"]
+        assert tags.get("seed") == seed
+    told = client.get_experiment(experiment.experiment_id).tags["mlflow.note.content"]
+    assert "Which?" in told and "Table 5.5" in told
+    parent = written["runs"]["study-ablations/toys/E"]["run_id"]
+    (picture,) = client.list_artifacts(parent, "figures")
+    assert picture.path == "figures/study-ablations.png"
     again = log_runs(own, groups, tmp_path / "runs.json")
     assert {run["status"] for run in again["runs"].values()} == {"kept"}
 
@@ -338,8 +375,8 @@ def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
     told = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
     registered = register_champions(*told)
     best = results.champion("scenenet")
-    assert registered["scenenet"]["seed"] == best.seed
-    assert registered["scenenet"]["version"] == 1
+    assert registered["scenenet-scenenet"]["seed"] == best.seed
+    assert registered["scenenet-scenenet"]["version"] == 1
     grids = np.zeros((3, 9, 8, 7), np.float32)
     grids[0, 2:7, 3, 3] = grids[2, 4, 4, 4] = 1
     # In a process of its own, as somebody else would load it.
@@ -363,7 +400,7 @@ def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
     np.testing.assert_allclose(answer, expected, atol=1e-6)
 
     again = register_champions(*told)
-    assert again["scenenet"]["version"] == 1, "the same champion is no new version"
+    assert again["scenenet-scenenet"]["version"] == 1, "the same champion is no new version"
     # Another seed takes the lead: the alias moves on, the first version stays.
     better = results.folder / "tune" / "scenenet" / f"seed-{1 - best.seed}.json"
     tuning = json.loads(better.read_text())
@@ -372,7 +409,34 @@ def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
     changed = Results(results.folder, results.models, results.seeds, results.surveys)
     log_runs(settings, model_groups(changed, "toys"), tmp_path / "runs.json")
     moved = register_champions(settings, changed, *told[2:])
-    assert (moved["scenenet"]["seed"], moved["scenenet"]["version"]) == (1 - best.seed, 2)
+    new = moved["scenenet-scenenet"]
+    assert (new["seed"], new["version"]) == (1 - best.seed, 2)
     client = MlflowClient(tracking_uri=settings.uri)
     assert client.get_model_version_by_alias("scenenet-scenenet", "champion").version == 2
     assert len(client.search_model_versions("name = 'scenenet-scenenet'")) == 2
+
+
+def test_the_best_of_all_models_is_the_champion_of_the_run(settings, results, tmp_path):
+    """That of each model has a name of its own; the bare name is the best there is."""
+    client = MlflowClient(tracking_uri=settings.uri)
+    told = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
+    log_runs(settings, model_groups(results, "toys"), tmp_path / "runs.json")
+    registered = register_champions(*told)
+    assert set(registered) == {"scenenet", "scenenet-scenenet", "scenenet-cnn"}
+    assert registered["scenenet"]["model"] == "scenenet"
+    version = client.get_model_version_by_alias("scenenet", "champion")
+    assert version.run_id == registered["scenenet-scenenet"]["run_id"]
+    assert (version.tags["model"], version.tags["seed"]) == ("scenenet", "0")
+    # The CNN takes the lead.
+    tuned = results.folder / "tune" / "cnn" / "seed-0.json"
+    tuning = json.loads(tuned.read_text())
+    tuning["validation"]["f05"] = 0.99
+    tuned.write_text(json.dumps(tuning))
+    changed = Results(results.folder, results.models, results.seeds, results.surveys)
+    log_runs(settings, model_groups(changed, "toys"), tmp_path / "runs.json")
+    moved = register_champions(settings, changed, *told[2:])
+    assert (moved["scenenet"]["model"], moved["scenenet"]["version"]) == ("cnn", 2)
+    assert moved["scenenet-scenenet"]["version"] == 1
+    version = client.get_model_version_by_alias("scenenet", "champion")
+    assert version.tags["model"] == "cnn"
+    assert (moved["scenenet"]["seed"], version.run_id) == (0, moved["scenenet-cnn"]["run_id"])

@@ -35,6 +35,7 @@ rule track:
         trainings=TRAININGS,
         tunings=TUNINGS,
         scores=SCORES,
+        black_box=BLACK_BOX,
     output:
         runs=f"{R}/mlflow/runs.json",
         provenance=f"{R}/mlflow/provenance.json",
@@ -67,8 +68,10 @@ rule track:
 
 rule track_studies:
     input:
+        **pictures([f"study-{study}" for study in STUDIED]),
         store=f"{R}/mlflow/store.json",
         runs=STUDIES,
+        records=expand(f"{R}/studies/{{study}}/provenance.json", study=STUDIED),
     output:
         runs=TRACKED_STUDIES,
         provenance=f"{R}/mlflow/studies.provenance.json",
@@ -85,6 +88,7 @@ rule track_studies:
             "track_studies",
             SETTINGS["tracking"],
             dataset=settings.dataset,
+            protocol=PROTOCOL,
             studies=SETTINGS["studies"],
         ),
     message:
@@ -112,6 +116,6 @@ rule register:
     params:
         job=job("register", SETTINGS["tracking"], dataset=settings.dataset, results=gathered()),
     message:
-        "Registering the best seed of each model in MLflow"
+        "Registering the best models in MLflow"
     script:
         "../scripts/register.py"

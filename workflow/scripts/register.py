@@ -1,4 +1,4 @@
-"""Bring the best seed of each model into MLflow's registry."""
+"""Bring the best of each model and of all into MLflow's registry."""
 
 import adapter
 from gathered import results_of

@@ -3,6 +3,11 @@
 import adapter
 from gathered import results_of
 
+NOTE = (
+    "Every training: a run for each model with the mean and spread over its seeds, and under it "
+    "one for each seed. The black box is boosted trees on features of the voxels, to compare with."
+)
+
 
 def track(job: adapter.Job) -> None:
     from scenenet.figures import read_pictures
@@ -16,7 +21,8 @@ def track(job: adapter.Job) -> None:
         protocol=job.identity["protocol"],
         pictures=read_pictures(results.folder / "figures", job.identity["pictures"]),
     )
-    log_runs(TrackingSettings(**job.settings), groups, job.output.runs, job.input.store)
+    settings = TrackingSettings(**job.settings)
+    log_runs(settings, groups, job.output.runs, job.input.store, NOTE)
 
 
 adapter.run(track)

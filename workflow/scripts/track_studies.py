@@ -4,16 +4,28 @@ import adapter
 
 
 def track_studies(job: adapter.Job) -> None:
-    from scenenet.results import read_table
+    from pathlib import Path
+
+    from scenenet.figures import read_pictures
+    from scenenet.results import read_result, read_table
     from scenenet.studies.settings import StudySettings
     from scenenet.tracking import TrackingSettings, log_runs
-    from scenenet.tracking.studies import experiment_of, study_groups
+    from scenenet.tracking.studies import experiment_of, note_of, study_groups
 
     settings = TrackingSettings(**job.settings)
     studies = [StudySettings(**study) for study in job.identity["studies"]]
-    for study, runs, record in zip(studies, job.input.runs, job.output.runs, strict=True):
-        groups = study_groups(study, read_table(runs), job.identity["dataset"])
-        log_runs(experiment_of(settings, study.name), groups, record, job.input.store)
+    files = zip(job.input.runs, job.input.records, job.input.pictures, job.output.runs, strict=True)
+    for study, (runs, record, picture, logged) in zip(studies, files, strict=True):
+        groups = study_groups(
+            study,
+            read_table(runs),
+            job.identity["dataset"],
+            job.identity["protocol"],
+            read_result(Path(record)),
+            read_pictures(Path(picture).parent, [Path(picture).stem]),
+        )
+        own = experiment_of(settings, study.name)
+        log_runs(own, groups, logged, job.input.store, note_of(study))
 
 
 adapter.run(track_studies)

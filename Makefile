@@ -6,7 +6,7 @@ CORES ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
-.PHONY: reproduce test bench lint clean help
+.PHONY: reproduce test bench pictures lint clean help
 
 reproduce: $(INSTALLED)  ## all results of the default configuration, under results/
 	$(VENV)/bin/snakemake --cores $(CORES)
@@ -16,6 +16,9 @@ test: $(INSTALLED)  ## the tests
 
 bench: $(INSTALLED)  ## speed of the engine beside other ways to the same results
 	$(VENV)/bin/scenenet bench
+
+pictures: $(INSTALLED)  ## docs/images anew from the results of make reproduce; needs Chromium
+	$(VENV)/bin/python docs/pictures.py
 
 lint: $(INSTALLED)  ## style, types, formatting
 	$(VENV)/bin/ruff check .

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
 
 import hypothesis
 import numpy as np
@@ -50,6 +53,17 @@ POLE_TAU = 0.7
 @pytest.fixture(scope="session")
 def project_root() -> Path:
     return ROOT
+
+
+@pytest.fixture(scope="session")
+def pictures() -> ModuleType:
+    """``docs/pictures.py``, which opens pages as a reader has them; skips without Chromium."""
+    spec = importlib.util.spec_from_file_location("pictures", ROOT / "docs" / "pictures.py")
+    module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if module.chromium() is None:
+        pytest.skip("no Chromium here; on Debian and Ubuntu: apt install chromium")
+    return module
 
 
 @pytest.fixture(scope="session")

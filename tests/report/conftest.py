@@ -11,11 +11,14 @@ import pandas as pd
 import pytest
 import torch
 
+from scenenet.figures import draw_all, plan
 from scenenet.modelfile import ModelCard, write_model
 from scenenet.models import CNN, SceneNet
 from scenenet.published import Thesis, read_thesis
+from scenenet.report import write_report
 from scenenet.results import Results
 from scenenet.store import create
+from scenenet.tables import write_tables
 
 EPOCHS = 4
 CROPS = ("north-0001", "north-0002", "north-0003")
@@ -46,6 +49,17 @@ def results(tmp_path: Path) -> Results:
             _write_training(made.folder, model, seed)
     _write_prediction(made.folder / "predict" / "fresh")
     return made
+
+
+@pytest.fixture
+def page(results: Results, thesis: Thesis, tmp_path: Path) -> Path:
+    """The report of ``results``, with three of its pictures."""
+    write_tables(results, thesis, results.folder / "tables")
+    chosen = ("training-scenenet", "precision-recall", "prediction-fresh")
+    draw_all([d for d in plan(results, thesis) if d.name in chosen], results.folder / "figures")
+    out = tmp_path / "report" / "index.html"
+    write_report(results, thesis, out)
+    return out
 
 
 def write_json(path: Path, data: object) -> None:

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
 from scenenet.errors import InputError
 from scenenet.figures import draw_all, plan
-from scenenet.metrics import ThresholdCurve
 from scenenet.published import Thesis
 from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
 from scenenet.results import Results
-from scenenet.scenes3d import write_scene
 from scenenet.studies.run import COLUMNS
 from scenenet.studies.settings import StudySettings
 from scenenet.tables import write_tables
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 VOID = {"meta", "img", "br", "hr", "link"}
 
 
@@ -52,16 +46,6 @@ class Page(HTMLParser):
 
     def all(self, tag: str) -> list[dict[str, str | None]]:
         return [attributes for name, attributes in self.elements if name == tag]
-
-
-@pytest.fixture
-def page(results: Results, thesis: Thesis, tmp_path: Path) -> Path:
-    write_tables(results, thesis, results.folder / "tables")
-    chosen = ("training-scenenet", "precision-recall", "prediction-fresh")
-    draw_all([d for d in plan(results, thesis) if d.name in chosen], results.folder / "figures")
-    out = tmp_path / "report" / "index.html"
-    write_report(results, thesis, out)
-    return out
 
 
 def read(path: Path) -> Page:
@@ -192,100 +176,3 @@ def test_a_picture_that_is_none_is_named(page: Path, results: Results, thesis: T
 )
 def test_values_are_written_as_people_read_them(value, how, text):
     assert write(value, how) == text
-
-
-def browse(page: Path, tmp_path: Path) -> str:
-    """The document as Chromium has it after five seconds, without a network."""
-    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run",
-               "--disable-background-networking", "--disable-component-update", "--disable-sync",
-               f"--user-data-dir={tmp_path / 'browser'}", "--virtual-time-budget=5000",
-               "--dump-dom", page.as_uri()]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
-    return done.stdout
-
-
-ACT = """<script>
-addEventListener("error", (event) => { document.body.dataset.error = event.message; });
-addEventListener("load", () => {
-  const told = document.body.dataset;
-  const canvas = document.querySelector("figure.scene canvas");
-  const ink = () => {
-    const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-    let sum = 0;
-    for (let i = 3; i < pixels.length; i += 4) sum += pixels[i] > 0;
-    return sum;
-  };
-  const picture = () => canvas.toDataURL();
-  told.ink = ink();
-  const slider = document.querySelector("figure.scene input");
-  const said = document.querySelector("figure.scene output");
-  const move = (to) => { slider.value = to; slider.dispatchEvent(new Event("input")); };
-  move(0); told.low = said.textContent;
-  move(120); told.high = said.textContent;
-  const before = picture();
-  canvas.dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
-  told.turned = picture() !== before;
-  const select = document.querySelector("figure.scene select");
-  told.colours = [...select.options].map((option) => option.value);
-  told.drawn = [...select.options].map((option) => {
-    select.value = option.value;
-    select.dispatchEvent(new Event("change"));
-    return picture();
-  }).filter((one, i, all) => all.indexOf(one) === i).length;
-  const table = [...document.querySelectorAll("table")]
-    .find((one) => one.textContent.includes("best on validation"));
-  const heads = [...table.querySelectorAll("thead button")];
-  const column = heads.findIndex((head) => head.textContent === "recall");
-  const rows = table.tBodies[0].rows;
-  const read = () => [...rows].map((row) => parseFloat(row.cells[column].textContent));
-  const press = () => heads[column].click();
-  press(); told.rising = read();
-  press(); told.falling = read();
-});
-</script></body>"""
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
-def test_a_crop_turns_tau_moves_the_scores_and_tables_sort(
-    page: Path, results: Results, thesis: Thesis, tmp_path: Path
-):
-    scene = write_scene(results, "scenenet", "best", results.folder / "scenes" / "best.json")
-    write_report(results, thesis, page)
-    html = page.read_text(encoding="utf-8")
-    page.write_text(html.replace("</body>", ACT), encoding="utf-8")
-    dom = browse(page, tmp_path)
-    told = dict(re.findall(r'data-(\w+)="([^"]*)"', dom[dom.index("<body") :].partition(">")[0]))
-    assert "error" not in told
-    assert int(told["ink"]) > 1000
-    assert told["turned"] == "true"
-    assert told["colours"].split(",")[:3] == ["found", "class", "probability"]
-    assert int(told["drawn"]) == len(told["colours"].split(","))
-    curve = ThresholdCurve(np.array(scene["true"]), np.array(scene["false"]))
-    for name, step in (("low", 0), ("high", 120)):
-        counts = curve.confusion(step)
-        assert f"precision {counts.precision:.3f}, recall {counts.recall:.3f}" in told[name]
-    rising = [float(x) for x in told["rising"].split(",")]
-    assert rising == sorted(rising)
-    assert [float(x) for x in told["falling"].split(",")] == sorted(rising, reverse=True)
-    assert len(set(rising)) > 1
-
-
-@pytest.mark.skipif(CHROMIUM is None, reason="no chromium on this machine")
-def test_a_phone_shows_the_page_without_scrolling_sideways(page: Path, tmp_path: Path):
-    # The frame is as wide as a phone; the page in it says how wide it came out.
-    measure = (
-        "<script>const page = document.documentElement;"
-        "parent.postMessage([page.scrollWidth, page.clientWidth, innerWidth], '*')</script></body>"
-    )
-    inner = page.read_text(encoding="utf-8").replace("</body>", measure)
-    (tmp_path / "inner.html").write_text(inner, encoding="utf-8")
-    outer = tmp_path / "outer.html"
-    outer.write_text(
-        "<body><script>addEventListener('message', e => document.body.dataset.widths = e.data)"
-        "</script><iframe src='inner.html' style='width:390px;height:800px;border:0'></iframe>"
-    )
-    dom = browse(outer, tmp_path)
-    widths = re.search(r'data-widths="(\d+),(\d+),(\d+)"', dom)
-    assert widths, dom[-2000:]
-    content, room, screen = map(int, widths.groups())
-    assert (content, screen) == (room, 390)

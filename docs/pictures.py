@@ -1,0 +1,235 @@
+"""The pictures of the documentation, taken from what a run has left: ``make pictures``.
+
+Opens the page and MLflow's own pages in Chromium, as a reader would, and writes ``docs/images``.
+Needs a run with the studies ``ablations`` and ``alpha-epsilon`` in the folder it is called in, the
+extra ``dev`` and Chromium (on Debian and Ubuntu: apt install chromium).
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import shutil
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenenet.errors import InputError
+from scenenet.files import atomic
+from scenenet.tracking.ui import comparison, experiment_runs, metric_over_steps, serving
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+    from mlflow.entities import Run
+    from playwright.sync_api import Page
+
+IMAGES = Path(__file__).parent / "images"
+WIDTH = 1200
+COLOURS = 128
+"""In the palette; text and charts need no more, and the files are a third of their size."""
+
+PATIENCE_MS = 60_000
+"""How long a page may take to show what is waited for."""
+
+PREFERENCES = {
+    "mlflow.workflowType_v1": '"machine_learning"',
+    "mlflow.assistant.panelOpen_v1": "false",
+    "mlflow.assistant.fab.autoOpenedOnFirstLoad_v1": "true",
+}
+"""What somebody who uses MLflow for trainings has chosen in it: "Model training" at the top left,
+and the assistant closed."""
+
+SHOWN_SCORES = ("f05", "precision", "recall", "iou_tower", "miou")
+"""What the table of runs shows, of the crops that were scored."""
+
+
+def chromium() -> str | None:
+    """The browser of this machine."""
+    names = ("chromium", "chromium-browser", "google-chrome")
+    return next((found for name in names if (found := shutil.which(name))), None)
+
+
+@contextlib.contextmanager
+def browsing(
+    scheme: str = "light", width: int = WIDTH, height: int = 900, **stored: str
+) -> Iterator[Page]:
+    """A page in Chromium, without anything remembered but MLflow's preferences.
+
+    Args:
+        scheme: ``light`` or ``dark``.
+        width, height: of the window, px.
+        stored: what else the browser remembers of its last visit, as in ``localStorage``.
+    """
+    from playwright.sync_api import sync_playwright
+
+    remembered = json.dumps(PREFERENCES | stored)
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium(), args=["--disable-gpu"])
+        context = browser.new_context(
+            color_scheme=scheme, viewport={"width": width, "height": height}
+        )
+        context.set_default_timeout(PATIENCE_MS)
+        context.add_init_script(f"Object.assign(localStorage, {remembered})")
+        yield context.new_page()
+        browser.close()
+
+
+@dataclass(frozen=True)
+class Tracked:
+    """An MLflow store, and its runs by experiment.
+
+    Attributes:
+        client: to ask it.
+        address: where its pages are served.
+        experiment: name of the experiment of the trainings; studies are called after it.
+    """
+
+    client: MlflowClient
+    address: str
+    experiment: str = "scenenet"
+
+    def id_of(self, study: str | None = None) -> str:
+        name = self.experiment if study is None else f"{self.experiment}-{study}"
+        found = self.client.get_experiment_by_name(name)
+        if found is None:
+            raise InputError(f"the store has no experiment {name!r}", remedy="Run the workflow")
+        return str(found.experiment_id)
+
+    def runs(self, study: str | None = None, filter_string: str = "") -> list[Run]:
+        """Runs in the order of their names."""
+        found = self.client.search_runs([self.id_of(study)], filter_string, max_results=1000)
+        return sorted(found, key=lambda run: str(run.info.run_name))
+
+    def variants(self, study: str) -> list[Run]:
+        """The runs of a study that hold the means over the seeds."""
+        return [run for run in self.runs(study) if "seed" not in run.data.tags]
+
+    def comparison(self, runs: Sequence[Run]) -> str:
+        ids = [run.info.run_id for run in runs]
+        return comparison(self.address, runs[0].info.experiment_id, ids)
+
+
+def save(image: bytes, out: Path) -> None:
+    """Write a screenshot as a PNG with a palette, whole or not at all."""
+    import io
+
+    from PIL import Image
+
+    picture = Image.open(io.BytesIO(image)).convert("RGB")
+    reduced = picture.quantize(COLOURS, dither=Image.Dither.NONE)
+    with atomic(out) as partial:
+        reduced.save(partial, format="PNG", optimize=True)
+
+
+def take_page(report: Path, out: Path) -> None:
+    """The top of the page, light."""
+    with browsing(height=1000) as page:
+        page.goto(report.resolve().as_uri())
+        page.locator("h1").first.wait_for()
+        save(page.screenshot(), out / "report.png")
+
+
+def take_experiments(store: Tracked, out: Path) -> None:
+    """The list of experiments, one for each study."""
+    with browsing(height=520) as page:
+        page.goto(f"{store.address}/#/experiments")
+        page.get_by_text(f"{store.experiment}-ablations").first.wait_for()
+        save(page.screenshot(), out / "mlflow-experiments.png")
+
+
+def take_runs(store: Tracked, out: Path) -> None:
+    """The variants of the ablation study, ticked; and what *Compare* then shows."""
+    experiment = store.id_of("ablations")
+    variants = store.variants("ablations")
+    with browsing(height=640, **_columns(experiment, variants)) as page:
+        page.goto(experiment_runs(store.address, experiment))
+        page.get_by_text(str(variants[0].info.run_name)).first.wait_for()
+        page.get_by_role("checkbox").first.check(force=True)
+        page.get_by_role("button", name="Compare").wait_for()
+        save(page.screenshot(), out / "mlflow-runs.png")
+    with browsing(height=1000) as page:
+        open_comparison(page, store, variants)
+        save(page.screenshot(), out / "mlflow-compare.png")
+
+
+def take_seeds(store: Tracked, out: Path) -> None:
+    """The seeds of a SCENE-Net: their scores, and the path of one number."""
+    seeds = store.runs(filter_string="tags.model = 'scenenet' and tags.seed != ''")
+    with browsing(height=1000) as page:
+        open_comparison(page, store, seeds)
+        page.get_by_text("Metrics", exact=True).last.scroll_into_view_if_needed()
+        page.get_by_text("test_f05", exact=True).first.scroll_into_view_if_needed()
+        save(page.screenshot(), out / "mlflow-seeds.png")
+    ids = [run.info.run_id for run in seeds]
+    with browsing(height=760) as page:
+        metric = "negative_sphere.omega"
+        page.goto(metric_over_steps(store.address, store.id_of(), ids, metric))
+        page.locator(".js-plotly-plot .scatterlayer .trace").nth(len(ids) - 1).wait_for(
+            state="attached"
+        )
+        save(page.screenshot(), out / "mlflow-path.png")
+
+
+def take_grid(store: Tracked, out: Path) -> None:
+    """Alpha and epsilon against the score."""
+    with browsing(height=760) as page:
+        open_comparison(page, store, store.variants("alpha-epsilon"))
+        save(page.screenshot(), out / "mlflow-grid.png")
+
+
+def open_comparison(page: Page, store: Tracked, runs: Sequence[Run]) -> None:
+    """Open the comparison of ``runs`` and wait until it is drawn and its table is there."""
+    page.goto(store.comparison(runs))
+    page.get_by_text(f"Comparing {len(runs)} Runs").wait_for()
+    page.get_by_text(str(runs[0].info.run_name), exact=True).first.wait_for()
+    page.locator(".js-plotly-plot svg").first.wait_for(state="attached")
+
+
+def _columns(experiment: str, runs: Sequence[Run]) -> dict[str, str]:
+    """The table of runs with its scores, as *Columns* in MLflow sets it."""
+    measured = {name for run in runs for name in run.data.metrics}
+    wanted = [f"{part}_{score}" for part in ("test", "validation") for score in SHOWN_SCORES]
+    names = [name for name in wanted if name in measured]
+    state: dict[str, Any] = {"selectedColumns": [f"metrics.`{name}`" for name in names]}
+    key = f'MLflowLocalStorage-1.1-ExperimentPage-["{experiment}"]-ReactComponentState'
+    return {key: json.dumps(state)}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--results", type=Path, default=Path("results"), help="result folder")
+    parser.add_argument("--uri", default="sqlite:///mlflow.db", help="MLflow store of the run")
+    parser.add_argument("--out", type=Path, default=IMAGES, help="where the pictures go")
+    asked = parser.parse_args(arguments)
+    try:
+        take(asked.results, asked.uri, asked.out)
+    except InputError as error:
+        sys.exit(f"Error: {error}")
+
+
+def take(results: Path, uri: str, out: Path) -> None:
+    """Take every picture.
+
+    Raises:
+        InputError: there is no Chromium, no page, or the store has not the studies.
+    """
+    from mlflow import MlflowClient
+
+    if chromium() is None:
+        raise InputError("there is no Chromium", remedy="apt install chromium")
+    report = results / "report" / "index.html"
+    if not report.is_file():
+        raise InputError("is not there", file=report, remedy="Run the workflow first: snakemake")
+    take_page(report, out)
+    with serving(uri) as address:
+        store = Tracked(MlflowClient(address), address)
+        for take_some in (take_experiments, take_runs, take_seeds, take_grid):
+            take_some(store, out)
+            print(f"{take_some.__name__}: done", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,169 @@
+"""The page as a reader has it in Chromium: light and dark, wide and narrow, without a network."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenenet.metrics import ThresholdCurve
+from scenenet.published import Thesis
+from scenenet.report import write_report
+from scenenet.results import Results
+from scenenet.scenes3d import write_scene
+
+SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
+PHONE_PX = 390
+
+INK = """canvas => {
+  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+  let sum = 0;
+  for (let i = 3; i < pixels.length; i += 4) sum += pixels[i] > 0;
+  return sum;
+}"""
+"""Pixels of a canvas that are not empty."""
+
+CONTRASTS = """() => {
+  const parts = (colour) => colour.match(/[\\d.]+/g).map(Number);
+  const light = (colour) => {
+    const [r, g, b] = parts(colour).map((part) => part / 255)
+      .map((part) => part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const behind = (element) => {
+    for (let one = element; one; one = one.parentElement) {
+      const colour = getComputedStyle(one).backgroundColor;
+      const opacity = parts(colour)[3];
+      if (opacity === undefined || opacity === 1) return colour;
+    }
+    return "rgb(255, 255, 255)";
+  };
+  const found = {};
+  for (const one of document.querySelectorAll("h1, h2, h3, p, td, th button, figcaption, nav a")) {
+    if (!one.textContent.trim() || !one.offsetParent) continue;
+    const both = [light(getComputedStyle(one).color), light(behind(one))];
+    const [low, high] = both.sort((a, b) => a - b);
+    const name = one.tagName.toLowerCase();
+    found[name] = Math.min(found[name] ?? 21, (high + 0.05) / (low + 0.05));
+  }
+  return found;
+}"""
+"""Lowest contrast of text with what is behind it, by kind of element (WCAG 2)."""
+
+
+@pytest.fixture
+def scene(page: Path, results: Results, thesis: Thesis) -> dict:
+    """What the turning crop of the page is made from."""
+    made = write_scene(results, "scenenet", "best", results.folder / "scenes" / "best.json")
+    write_report(results, thesis, page)
+    return made
+
+
+@contextlib.contextmanager
+def opened(pictures, file: Path, **window):
+    """The page, which must ask for nothing and complain of nothing while it is used."""
+    faults, asked = [], []
+    with pictures.browsing(**window) as tab:
+        tab.on("pageerror", lambda error: faults.append(str(error)))
+        tab.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+        tab.on("request", lambda request: asked.append(request.url))
+        tab.goto(file.as_uri())
+        yield tab
+    assert faults == []
+    assert [url for url in asked if not url.startswith("data:")] == [file.as_uri()]
+
+
+@SCHEMES
+def test_every_turning_crop_is_drawn_and_turns_under_the_mouse(pictures, page, scene, scheme):
+    with opened(pictures, page, scheme=scheme) as tab:
+        canvases = tab.locator("figure.scene canvas")
+        assert canvases.count() == 1
+        canvas = canvases.first
+        canvas.scroll_into_view_if_needed()
+        assert canvas.evaluate(INK) > 1000
+        before = canvas.evaluate("canvas => canvas.toDataURL()")
+        box = canvas.bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        tab.mouse.move(x, y)
+        assert canvas.evaluate("canvas => canvas.toDataURL()") == before, (
+            "it turns only when dragged"
+        )
+        tab.mouse.down()
+        tab.mouse.move(x + 80, y + 10, steps=4)
+        tab.mouse.up()
+        turned = canvas.evaluate("canvas => canvas.toDataURL()")
+        assert turned != before
+        canvas.focus()
+        tab.keyboard.press("ArrowLeft")
+        assert canvas.evaluate("canvas => canvas.toDataURL()") != turned
+
+
+def test_the_slider_moves_tau_and_the_scores_are_those_of_the_curve(pictures, page, scene):
+    curve = ThresholdCurve(np.array(scene["true"]), np.array(scene["false"]))
+    with opened(pictures, page) as tab:
+        slider, said = (tab.locator(f"figure.scene {one}") for one in ("input", "output"))
+        slider.scroll_into_view_if_needed()
+        box = slider.bounding_box()
+        middle = box["y"] + box["height"] / 2
+        seen = []
+        for share in (0.02, 0.5, 0.9):
+            tab.mouse.move(box["x"] + box["width"] * 0.5, middle)
+            tab.mouse.down()
+            tab.mouse.move(box["x"] + box["width"] * share, middle, steps=5)
+            tab.mouse.up()
+            step = int(slider.input_value())
+            counts = curve.confusion(step)
+            assert f"precision {counts.precision:.3f}, recall {counts.recall:.3f}" in (
+                said.inner_text()
+            )
+            seen.append(step)
+        assert seen == sorted(set(seen))
+
+
+def test_each_colouring_is_another_picture(pictures, page, scene):
+    with opened(pictures, page) as tab:
+        select, canvas = (tab.locator(f"figure.scene {one}") for one in ("select", "canvas"))
+        colours = select.evaluate("select => [...select.options].map(option => option.value)")
+        assert colours[:3] == ["found", "class", "probability"]
+        drawn = set()
+        for colour in colours:
+            select.select_option(colour)
+            drawn.add(canvas.evaluate("canvas => canvas.toDataURL()"))
+        assert len(drawn) == len(colours)
+
+
+def test_a_table_sorts_by_the_heading_that_is_pressed(pictures, page):
+    with opened(pictures, page) as tab:
+        table = tab.locator("table", has_text="best on validation").first
+        heads = table.locator("thead button")
+        column = heads.all_inner_texts().index("recall")
+        cells = table.locator(f"tbody tr td:nth-child({column + 1})")
+        heads.nth(column).click()
+        rising = [float(text.split()[0]) for text in cells.all_inner_texts()]
+        assert rising == sorted(rising)
+        assert len(set(rising)) > 1
+        heads.nth(column).press("Enter")
+        falling = [float(text.split()[0]) for text in cells.all_inner_texts()]
+        assert falling == sorted(rising, reverse=True)
+
+
+@SCHEMES
+def test_text_can_be_read_and_dark_is_dark(pictures, page, scheme):
+    with opened(pictures, page, scheme=scheme) as tab:
+        contrasts = tab.evaluate(CONTRASTS)
+        assert {"h1", "h2", "p", "td", "figcaption", "a"} <= set(contrasts)
+        assert min(contrasts.values()) >= 4.5, contrasts
+        paper = tab.evaluate("getComputedStyle(document.body).backgroundColor")
+        shade = sum(int(part) for part in paper[4:-1].split(",")) / (3 * 255)
+        assert shade > 0.9 if scheme == "light" else shade < 0.15
+
+
+@pytest.mark.parametrize("width", [PHONE_PX, 768, 1200])
+def test_nothing_makes_the_page_scroll_sideways(pictures, page, scene, width):
+    with opened(pictures, page, width=width, height=800) as tab:
+        content, room = tab.evaluate(
+            "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+        )
+        assert content == room == width

@@ -18,6 +18,7 @@ include: "workflow/rules/dataset.smk"
 include: "workflow/rules/models.smk"
 include: "workflow/rules/predict.smk"
 include: "workflow/rules/studies.smk"
+include: "workflow/rules/contests.smk"
 include: "workflow/rules/tracking.smk"
 include: "workflow/rules/report.smk"
 
@@ -34,10 +35,16 @@ rule all:
         scores=SCORES,
         tables=[*TABLES, COMPARISON],
         studies=STUDIES,
+        contests=CONTEST_RUNS,
         models=[champion_file(model.name) for model in settings.models],
         predictions=expand(f"{R}/predict/{{survey}}/{{survey}}.laz", survey=NEW),
         store=list(STORE.values()),
-        runs=[f"{R}/mlflow/runs.json", f"{R}/mlflow/registry.json", *TRACKED_STUDIES],
+        runs=[
+            f"{R}/mlflow/runs.json",
+            f"{R}/mlflow/registry.json",
+            *TRACKED_STUDIES,
+            *TRACKED_CONTESTS,
+        ],
         report=f"{R}/report/index.html",
     message:
         "All results are there"

@@ -14,6 +14,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenenet.config_errors import explain
+from scenenet.contests.settings import NoiseSettings, contenders
 from scenenet.crops import CropSettings
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
@@ -101,6 +102,7 @@ class Config(Settings):
     studies: tuple[StudySettings, ...] = Field(
         (), description="many small trainings that differ in one thing; config/studies.yaml"
     )
+    noise: NoiseSettings = NoiseSettings()
     detection: DetectionSettings = DetectionSettings()
     predict: Prediction = Prediction()
     tracking: TrackingSettings = TrackingSettings()
@@ -142,7 +144,16 @@ class Config(Settings):
             if study.model not in known:
                 raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
             study.plans(self.model_named(study.model), self.voxels, self.split)
+        self.noise_models()
         return self
+
+    def noise_models(self) -> list[ModelSettings]:
+        """The models that are trained on wrong labels."""
+        return contenders(self.noise.contenders, self.models, "noise.contenders")
+
+    def contests(self) -> list[str]:
+        """Names of the contests that are held (``scenenet.contests``)."""
+        return ["noise"] if self.noise.levels else []
 
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)

@@ -85,6 +85,7 @@ class Results:
         surveys: surveys that make the data set.
         predicted: surveys that were classified.
         studies: what was studied beside.
+        contests: which of ``scenenet.contests`` were held.
     """
 
     folder: Path
@@ -93,6 +94,7 @@ class Results:
     surveys: Sequence[str] = ()
     predicted: Sequence[str] = ()
     studies: Sequence[StudySettings] = ()
+    contests: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", Path(self.folder))
@@ -152,6 +154,14 @@ class Results:
         """A row per variant and seed of a study; None if it was not run."""
         path = self.folder / "studies" / study / "runs.csv"
         return read_table(path) if path.exists() else None
+
+    def contest_runs(self, contest: str) -> pd.DataFrame:
+        """A row per model and seed, and what else a contest varies.
+
+        Raises:
+            InputError: it has not been held.
+        """
+        return read_table(self.folder / contest / "runs.csv")
 
     def champion_file(self, model: str) -> Path | None:
         """The model that predicts (``models/MODEL.json``, or only ``.safetensors``)."""

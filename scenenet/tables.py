@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from scenenet.contests.tables import CONTEST_TABLES
 from scenenet.files import atomic
 from scenenet.published import Published, Thesis
 from scenenet.results import BLACK_BOX, Results, SeedResult
@@ -233,13 +234,15 @@ TABLES: Mapping[str, Callable[[Results, Thesis], pd.DataFrame]] = {
 def write_tables(
     results: Results, thesis: Thesis, out: str | Path, names: Iterable[str] = tuple(TABLES)
 ) -> list[Path]:
-    """Write the tables called ``names`` as ``out/NAME.csv``, and those of the studies as
-    ``out/study-NAME.csv``."""
+    """Write the tables called ``names`` as ``out/NAME.csv``, those of the studies as
+    ``out/study-NAME.csv`` and those of the contests by their names."""
     made = {name: TABLES[name](results, thesis) for name in names}
     for study in results.studies:
         runs = results.study_runs(study.name)
         if runs is not None:
             made[f"study-{study.name}"] = summarise(study, runs, thesis)
+    for contest in results.contests:
+        made[contest] = CONTEST_TABLES[contest](results.contest_runs(contest))
     paths = []
     for name, table in made.items():
         path = Path(out) / f"{name}.csv"

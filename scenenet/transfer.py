@@ -10,23 +10,18 @@ docs/synthetic.md.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pandas as pd
 
-from scenenet.blackbox import BlackBoxSettings, fit_and_tune
-from scenenet.blackbox import fit as fit_trees
-from scenenet.blackbox import tune as tune_trees
-from scenenet.metrics import Confusion, ThresholdCurve, confusion
+from scenenet.metrics import Confusion, ThresholdCurve
 from scenenet.pointcloud import PointCloud
 from scenenet.progress import track
 from scenenet.protocol import ModelSettings, TrainingSettings
 from scenenet.realism import real_crops, synthetic_crops
+from scenenet.rivals import Rival, train_black_box, train_model
 from scenenet.synthetic import SyntheticSettings
-from scenenet.training import fit, probabilities
-from scenenet.tuning import threshold_curve
 from scenenet.voxels import VoxelGrid, VoxelSample, voxelise
 
 RESOLUTION = 64
@@ -42,63 +37,16 @@ FIELD_MODEL = ModelSettings(
     training=TrainingSettings(learning_rate=0.01, epochs=150),
 )
 
-Answer = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
-"""Probability (V,) and truth (V,) of all voxels of a sample."""
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """A trained model with what it was tuned to."""
-
-    answer: Answer
-    tau: float
-    f05: float
-
-    def score(self, samples: Iterable[VoxelSample]) -> Confusion:
-        """Counts over all voxels of ``samples``."""
-        total = Confusion()
-        for sample in samples:
-            probability, truth = self.answer(sample)
-            total += confusion(probability, truth, self.tau)
-        return total
-
-    def curve(self, samples: Iterable[VoxelSample]) -> ThresholdCurve:
-        """Scores over all voxels of ``samples`` at every tau."""
-        total = ThresholdCurve.empty()
-        for sample in samples:
-            total += ThresholdCurve.of(*self.answer(sample))
-        return total
-
 
 def train_scenenet(
     training: Sequence[VoxelSample],
     validation: Sequence[VoxelSample],
     seeds: Sequence[int],
     settings: ModelSettings = FIELD_MODEL,
-) -> Tuned:
+) -> Rival:
     """The best of some seeds by validation; without validation crops by the training ones."""
-    tried = []
-    for seed in seeds:
-        model, _ = fit(training, validation, settings, seed)
-        tau, counts = threshold_curve(model, validation or training, settings.measurement).best()
-
-        def answer(sample: VoxelSample, model=model) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
-            return probabilities(model, sample, settings.measurement)
-
-        tried.append(Tuned(answer, tau, counts.f05))
-    return max(tried, key=lambda tuned: tuned.f05)
-
-
-def train_black_box(training: Sequence[VoxelSample], validation: Sequence[VoxelSample]) -> Tuned:
-    """Trees, tuned on the validation crops or, without any, by leaving one training crop out."""
-    settings = BlackBoxSettings()
-    if validation:
-        model = tune_trees(fit_trees(training, settings, 0), validation)
-        f05 = 0.0
-    else:
-        model, curve = fit_and_tune(training, settings, 0)
-        f05 = curve.best()[1].f05
-    return Tuned(model.probabilities, model.threshold(), f05)
+    tried = [train_model(settings, training, validation, seed) for seed in seeds]
+    return max(tried, key=lambda rival: rival.f05)
 
 
 def transfer(

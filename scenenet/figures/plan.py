@@ -13,6 +13,7 @@ from typing import Any
 
 from scenenet.errors import InputError
 from scenenet.figures import crop_drawings, data_drawings, model_drawings
+from scenenet.figures.contests import CONTEST_DRAWINGS
 from scenenet.files import read_json, write_json
 from scenenet.published import Thesis
 from scenenet.results import Results
@@ -119,6 +120,9 @@ def plan(
     for study in results.studies:
         draw = _bind(model_drawings.draw_study, results, study, thesis)
         planned.append(Drawing(f"study-{study.name}", study.title, "studies", draw))
+    for contest in results.contests:
+        title, draw_contest = CONTEST_DRAWINGS[contest]
+        planned.append(Drawing(contest, title, contest, _bind(draw_contest, results)))
     return planned
 
 

@@ -11,6 +11,7 @@ from scenenet.errors import InputError
 from scenenet.files import write_text
 from scenenet.published import Thesis
 from scenenet.report import (
+    contest_sections,
     crop_sections,
     data_sections,
     model_sections,
@@ -32,6 +33,7 @@ SECTIONS: Sequence[SectionMaker] = (
     model_sections.learned,
     crop_sections.crops,
     study_sections.studies,
+    contest_sections.noise,
     study_sections.thesis_and_ours,
     survey_sections.predictions,
     data_sections.data,

@@ -130,15 +130,15 @@ def _plan(
     if unknown:
         raise ValueError(f"study {study}, {variant.name}: applied.{min(unknown)} is no setting")
     try:
-        trained = _changed(voxels, groups["voxels"])
+        trained = changed(voxels, groups["voxels"])
         size, resolution = (groups["applied"].get(name) for name in ("kernel_size", "resolution"))
         return Plan(
             variant.name,
-            _changed(model, groups["model"]),
+            changed(model, groups["model"]),
             trained,
-            _changed(split, groups["split"]),
-            None if size is None else _changed(model, {"kernel_size": size}).kernel_size,
-            trained if resolution is None else _changed(trained, {"resolution": resolution}),
+            changed(split, groups["split"]),
+            None if size is None else changed(model, {"kernel_size": size}).kernel_size,
+            trained if resolution is None else changed(trained, {"resolution": resolution}),
         )
     except ValidationError as error:
         fault = error.errors()[0]
@@ -146,8 +146,12 @@ def _plan(
         raise ValueError(f"study {study}, {variant.name}: {place}: {fault['msg']}") from None
 
 
-def _changed(settings: S, changes: Mapping[str, Any]) -> S:
-    """``settings`` with dotted ``changes``, checked anew."""
+def changed(settings: S, changes: Mapping[str, Any]) -> S:
+    """``settings`` with dotted ``changes``, checked anew.
+
+    Raises:
+        ValidationError: a change names no setting, or is none that it can be.
+    """
     raw = settings.model_dump()
     for dotted, value in changes.items():
         *path, last = dotted.split(".")

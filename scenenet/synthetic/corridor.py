@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -128,6 +129,15 @@ class Corridor:
 
     def stretch(self, index: int) -> Stretch:
         """Stretch ``index``, the same whichever others are made."""
+        (made,) = self.stretch_at(index, [self.settings.annotation_noise])
+        return made
+
+    def stretch_at(self, index: int, strengths: Sequence[float]) -> list[Stretch]:
+        """Stretch ``index`` as annotators of each of ``strengths`` label it.
+
+        The points are the same ones in all, and each is what a corridor of that
+        ``annotation_noise`` has.
+        """
         settings = self.settings
         rng = stream(settings.seed, STRETCH, index)
         before, after = self.line.support(index), self.line.support(index + 1)
@@ -141,11 +151,13 @@ class Corridor:
         truth = np.concatenate([codes for _, codes in parts])
         ends = [(index, before), (index + 1, after)]
         near = [(number, tower) for number, tower in ends if 1 <= number <= settings.towers]
-        labels = annotate(
-            xyz, truth, near, self._ground_near(near), settings.annotation_noise, settings.seed, rng
-        )
+        ground = self._ground_near(near)
+        labels = [
+            annotate(xyz, truth, near, ground, strength, settings.seed, deepcopy(rng))
+            for strength in strengths
+        ]
         xyz += self._origin
-        return Stretch(index, xyz, labels, truth)
+        return [Stretch(index, xyz, each, truth) for each in labels]
 
     def _strip_points(
         self,

@@ -31,6 +31,7 @@ FIGURES = {
     "Figures 5.8, 5.9, median": "crop-median",
     "Figures 5.8, 5.9, worst": "crop-worst",
     "Table 5.5": "study-ablations",
+    "5.2.5": "noise",
 }
 STUDIES = {
     "ablations": "Table 5.5",
@@ -69,6 +70,21 @@ def test_a_figure_is_there_with_a_caption_and_words_for_it(finished, place):
     said = read_json(picture.with_suffix(".json"))
     assert len(said["caption"]) > 60
     assert len(said["alt"]) > 40
+
+
+def test_5_2_5_is_a_study_of_wrong_labels_with_the_truth_beside(finished):
+    table = pd.read_csv(finished.results / "tables" / "noise.csv")
+    assert set(table["model"]) == {"the labels", "scenenet", "cnn", "black box"}
+    assert list(table["level"].unique()) == [0.0, 0.4]
+    assert (table["share"] - table["level"]).abs().max() < 0.05
+    labels = table[table["model"] == "the labels"].set_index("level")
+    assert labels.loc[0.0, "truth_f05"] == 1 > labels.loc[0.4, "truth_f05"]
+    runs = pd.read_csv(finished.results / "noise" / "runs.csv")
+    assert len(runs) == 2 * 2 * 4  # levels, seeds, models and the labels
+    logged = read_json(finished.results / "mlflow" / "noise.json")
+    assert logged["experiment"].endswith("-noise")
+    page = (finished.results / "report" / "index.html").read_text()
+    assert "Trained on wrong labels" in page
 
 
 @pytest.mark.parametrize("rank", ["best", "median", "worst"])

@@ -53,6 +53,7 @@ wildcard_constraints:
     survey=any_of(SURVEYS),
     synthetic=any_of(survey.name for survey in settings.synthetic.surveys),
     model=any_of(model.name for model in settings.models),
+    contest=any_of(settings.contests()),
     study=any_of(study.name for study in settings.studies),
     seed=r"\d+",
 

@@ -23,7 +23,7 @@ def each_seed_of(model):
     ]
 
 
-def gathered(models=None, surveys=TRAIN, predicted=(), studies=()):
+def gathered(models=None, surveys=TRAIN, predicted=(), studies=(), contests=()):
     """The arguments of ``scenenet.results.Results``. Models are pairs, because their order counts
     and that of a dict does not survive in a parameter."""
     chosen = settings.models if models is None else models
@@ -34,6 +34,7 @@ def gathered(models=None, surveys=TRAIN, predicted=(), studies=()):
         "surveys": list(surveys),
         "predicted": list(predicted),
         "studies": [settings.study_named(study).model_dump(mode="json") for study in studies],
+        "contests": list(contests),
     }
 
 
@@ -87,8 +88,12 @@ SCENES = expand(f"{R}/scenes/{{rank}}.json", rank=CROP_RANKS)
 STUDIED = [study.name for study in settings.studies]
 STUDIES = expand(f"{R}/studies/{{study}}/runs.csv", study=STUDIED)
 TRACKED_STUDIES = expand(f"{R}/mlflow/study-{{study}}.json", study=STUDIED)
+CONTESTS = settings.contests()
+CONTEST_RUNS = expand(f"{R}/{{contest}}/runs.csv", contest=CONTESTS)
+TRACKED_CONTESTS = expand(f"{R}/mlflow/{{contest}}.json", contest=CONTESTS)
 TABLES = expand(
-    f"{R}/tables/{{name}}.csv", name=[*TABLE_NAMES, *(f"study-{study}" for study in STUDIED)]
+    f"{R}/tables/{{name}}.csv",
+    name=[*TABLE_NAMES, *(f"study-{study}" for study in STUDIED), *CONTESTS],
 )
 COMPARISON = f"{R}/tables/thesis_and_ours.csv"
 PROTOCOL = (
@@ -106,6 +111,7 @@ ALL_PICTURES = [
     *(f"clusters-{survey}" for survey in MAPPED),
     *(f"prediction-{survey}" for survey in NEW),
     *(f"study-{study}" for study in STUDIED),
+    *CONTESTS,
 ]
 RECORDS = [
     *expand(f"{R}/check/{{survey}}/provenance.json", survey=CHECKED),
@@ -118,6 +124,7 @@ RECORDS = [
     *expand(f"{R}/models/{{model}}.provenance.json", model=[m.name for m in settings.models]),
     *expand(f"{R}/predict/{{survey}}/provenance.json", survey=NEW),
     *expand(f"{R}/studies/{{study}}/provenance.json", study=STUDIED),
+    *expand(f"{R}/{{contest}}/provenance.json", contest=CONTESTS),
     *expand(f"{R}/scenes/{{rank}}.provenance.json", rank=CROP_RANKS),
     f"{R}/black_box/provenance.json",
     f"{R}/tables/provenance.json",

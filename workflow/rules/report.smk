@@ -29,6 +29,7 @@ rule tables:
         tunings=TUNINGS,
         scores=SCORES,
         studies=STUDIES,
+        contests=CONTEST_RUNS,
         black_box=BLACK_BOX,
         thesis=ancient(settings.thesis),
     output:
@@ -44,7 +45,7 @@ rule tables:
         mem_mb=1000,
         runtime=10,
     params:
-        job=job("tables", {}, results=gathered(studies=STUDIED), input=THESIS),
+        job=job("tables", {}, results=gathered(studies=STUDIED, contests=CONTESTS), input=THESIS),
     message:
         "Writing the tables"
     script:
@@ -239,7 +240,7 @@ rule report:
         job=job(
             "report",
             {},
-            results=gathered(surveys=TRAIN, predicted=NEW, studies=STUDIED),
+            results=gathered(surveys=TRAIN, predicted=NEW, studies=STUDIED, contests=CONTESTS),
             input=THESIS,
         ),
     message:

@@ -21,7 +21,7 @@ rule mlflow_store:
         mem_mb=2000,
         runtime=10,
     params:
-        job=job("mlflow_store", SETTINGS["tracking"], studies=STUDIED),
+        job=job("mlflow_store", SETTINGS["tracking"], studies=[*STUDIED, *CONTESTS]),
     message:
         "Making the MLflow store"
     script:

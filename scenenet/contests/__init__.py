@@ -1,0 +1,11 @@
+"""SCENE-Net beside its rivals, trained on the same crops and scored on the same others.
+
+- ``settings``: which models, and on what.
+- ``noisy_line``, ``noise``: labels of which a known share is wrong (thesis 5.2.5).
+"""
+
+from __future__ import annotations
+
+from scenenet.contests.settings import Contender, NoiseSettings
+
+__all__ = ["Contender", "NoiseSettings"]

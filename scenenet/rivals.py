@@ -1,0 +1,122 @@
+"""SCENE-Net, the CNN and the black box, trained on the same crops and scored on the same others.
+
+Each chooses tau in its own way (docs/accuracy.md): a SCENE-Net in metres on the crops it learnt
+from as well, the black box never on those.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenenet import blackbox
+from scenenet.blackbox import BlackBoxSettings
+from scenenet.metrics import Confusion, ThresholdCurve, confusion
+from scenenet.protocol import ModelSettings
+from scenenet.search import best_step
+from scenenet.training import fit, probabilities, threshold_curve
+from scenenet.voxels import VoxelSample
+
+Answer = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
+"""Probability (V,) and truth (V,) of all voxels of a sample."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A trained model with what it was tuned to.
+
+    Attributes:
+        answer: what it says to a sample.
+        tau: threshold.
+        f05: at tau, on the crops that tau was chosen on.
+        parameters: trained numbers.
+        seconds: that training and tuning took.
+    """
+
+    answer: Answer
+    tau: float
+    f05: float
+    parameters: int
+    seconds: float
+
+    def score(self, samples: Iterable[VoxelSample]) -> Confusion:
+        """Counts over all voxels of ``samples``."""
+        total = Confusion()
+        for sample in samples:
+            total += confusion(*self.answer(sample), self.tau)
+        return total
+
+    def curve(self, samples: Iterable[VoxelSample]) -> ThresholdCurve:
+        """Scores over all voxels of ``samples`` at every tau."""
+        total = ThresholdCurve.empty()
+        for sample in samples:
+            total += ThresholdCurve.of(*self.answer(sample))
+        return total
+
+
+def train_rival(
+    settings: ModelSettings | None,
+    training: Sequence[VoxelSample],
+    validation: Sequence[VoxelSample],
+    seed: int,
+) -> Rival:
+    """Train and tune one model.
+
+    Args:
+        settings: of the model; None for the black box.
+        validation: crops to choose tau on; without any it is chosen on the training crops, and
+            that of the black box by leaving out one of them at a time.
+
+    Raises:
+        InputError: there is no tower to learn from, or one crop alone for a black box.
+    """
+    if settings is None:
+        return train_black_box(training, validation, seed)
+    return train_model(settings, training, validation, seed)
+
+
+def train_model(
+    settings: ModelSettings,
+    training: Sequence[VoxelSample],
+    validation: Sequence[VoxelSample],
+    seed: int,
+) -> Rival:
+    """A SCENE-Net or a CNN; as ``train_rival``."""
+    begin = time.perf_counter()
+    model, _ = fit(training, [], settings, seed)
+    if model.field is None:
+        curve = threshold_curve(model, validation or training, settings.measurement)
+        tau, counts = curve.best()
+    else:
+        # As in ``scenenet.tuning``: eleven numbers hardly know their crops by heart.
+        both = [*training, *validation]
+        step, _ = best_step(
+            threshold_curve(model, both, settings.measurement), model.field.false_weight
+        )
+        curve = threshold_curve(model, validation or training, settings.measurement)
+        tau, counts = float(curve.tau[step]), curve.confusion(step)
+
+    def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
+        return probabilities(model, sample, settings.measurement)
+
+    return Rival(answer, tau, counts.f05, model.n_parameters(), time.perf_counter() - begin)
+
+
+def train_black_box(
+    training: Sequence[VoxelSample], validation: Sequence[VoxelSample], seed: int = 0
+) -> Rival:
+    """Trees; as ``train_rival``."""
+    begin = time.perf_counter()
+    settings = BlackBoxSettings()
+    if validation:
+        grown = blackbox.fit(training, settings, seed)
+        curve = blackbox.threshold_curve(grown, validation)
+        model = replace(grown, tau=curve.best()[0])
+    else:
+        model, curve = blackbox.fit_and_tune(training, settings, seed)
+    seconds = time.perf_counter() - begin
+    f05 = curve.best()[1].f05
+    return Rival(model.probabilities, model.threshold(), f05, model.n_parameters(), seconds)

@@ -1,0 +1,111 @@
+"""A contest as an MLflow experiment of its own: a parent for each model and case, a run for each
+seed, with the same names of metrics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scenenet.contests.noise_table import LABELS
+from scenenet.tracking.runs import RunGroup, RunRecord
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NOT_METRICS = ("seed", "model", "level", "fold", "crops")
+
+
+def noise_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
+    """The runs of the noise study.
+
+    Args:
+        runs: of ``scenenet.contests.noise``, a row per level, seed and model.
+        dataset: name of the data, part of every key, so that runs of other data stand beside.
+    """
+    groups = []
+    for (level, model), rows in runs.groupby(["level", "model"], sort=False):
+        told = (
+            f"F0.5 and more of the labels themselves, {level:.0%} of them wrong, as if they were "
+            "the answer of a model."
+            if model == LABELS
+            else f"Trained on labels of which {level:.0%} are wrong; labels_ is against such "
+            "labels, truth_ against the truth."
+        )
+        case = {"level": float(level), "model": str(model)}
+        groups.append(
+            group_of("noise", dataset, f"{model}, {level:.0%} wrong", case, rows, told, "5.2.5")
+        )
+    return groups
+
+
+def group_of(
+    contest: str,
+    dataset: str,
+    name: str,
+    case: Mapping[str, Any],
+    rows: pd.DataFrame,
+    told: str,
+    place: str,
+    child: Callable[[Mapping[str, Any]], str] = lambda row: f"seed-{row['seed']}",
+) -> RunGroup:
+    """A parent with the means of its rows, and a run for each of them.
+
+    Args:
+        name: of the parent, unique in the contest.
+        case: what the rows have in common; parameters of all runs.
+        told: description of the parent.
+        place: where the thesis asks for it.
+        child: what tells a row from the others.
+    """
+    key = f"{contest}/{dataset}/{name}"
+    tags = {"study": contest, "dataset": dataset, "place": place, "model": str(case["model"])}
+    numbers = [c for c in rows.columns if c not in NOT_METRICS]
+    children = []
+    for row in rows.to_dict("records"):
+        metrics = {column: _number(row[column]) for column in numbers}
+        rest = {column: row[column] for column in NOT_METRICS if column in row}
+        alive = {"alive": str(bool(row["alive"])).lower()}
+        children.append(
+            RunRecord(
+                key=f"{key}/{child(row)}",
+                name=f"{name}, {child(row).replace('-', ' ').replace('/', ', ')}",
+                params={**case, **rest},
+                metrics=metrics,
+                tags=tags | alive | {"seed": str(row["seed"])},
+                seconds=metrics.get("training_seconds") or 0.0,
+            )
+        )
+    parent = RunRecord(
+        key=key,
+        name=name,
+        params=case,
+        metrics=_means(children),
+        tags=tags | {"mlflow.note.content": f"{told} Mean over {len(rows)} runs. Thesis {place}."},
+        seconds=sum(record.seconds for record in children),
+    )
+    return RunGroup(parent, children)
+
+
+def _number(value: Any) -> float | None:
+    number = float(value) if value is not None else float("nan")
+    return number if np.isfinite(number) else None
+
+
+def _means(children: Sequence[RunRecord]) -> dict[str, float | None]:
+    """Means under the names of the runs' own metrics, so that both stand in one column."""
+    means: dict[str, float | None] = {"runs": len(children)}
+    for name in children[0].metrics:
+        values = [v for record in children if (v := record.metrics[name]) is not None]
+        if values:
+            means[name] = float(np.mean(values))
+        if len(values) > 1:
+            means[f"{name}_std"] = float(np.std(values, ddof=1))
+    return means
+
+
+CONTEST_GROUPS: Mapping[str, Callable[[pd.DataFrame, str], list[RunGroup]]] = {
+    "noise": noise_groups,
+}
+"""The runs of each contest, by its name."""

@@ -1,0 +1,72 @@
+"""A contest in tables, figure, MLflow and page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from scenenet.contests.noise import COLUMNS
+from scenenet.contests.noise_table import LABELS
+from scenenet.figures import draw_all, plan
+from scenenet.report import contest_sections
+from scenenet.report.material import Material
+from scenenet.tables import write_tables
+from scenenet.tracking.contests import noise_groups
+
+
+def noise_runs() -> pd.DataFrame:
+    rows = []
+    for level in (0.0, 0.4, 0.6):
+        for seed in (0, 1):
+            for model, f05 in ((LABELS, 1 - level), ("scenenet", 0.5), ("black box", 0.4)):
+                row = dict.fromkeys(COLUMNS, 0.25) | {"level": level, "share": level}
+                row |= {"seed": seed, "model": model, "alive": True, "truth_f05": f05 + seed / 100}
+                row["training_seconds"] = None if model == LABELS else 2.0
+                rows.append(row)
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture
+def noisy(results):
+    (results.folder / "noise").mkdir()
+    noise_runs().to_csv(results.folder / "noise" / "runs.csv", index=False)
+    return replace(results, contests=("noise",))
+
+
+def test_table_figure_and_section(noisy, thesis):
+    write_tables(noisy, thesis, noisy.folder / "tables", names=())
+    table = pd.read_csv(noisy.folder / "tables" / "noise.csv")
+    assert list(table["model"][:3]) == [LABELS, "scenenet", "black box"]
+    (drawing,) = [d for d in plan(noisy) if d.section == "noise"]
+    (picture,) = draw_all([drawing], noisy.folder / "figures")
+    assert picture.file.stat().st_size > 5000
+    assert "scenenet 0.25 and 0.51" in picture.alt
+    section = contest_sections.noise(Material(noisy, thesis))
+    assert section is not None
+    assert "scenenet does (2 of 2 trainings, F0.5 0.51" in section.blocks[0].text
+    kinds = [block.kind for block in section.blocks]
+    assert kinds == ["text", "facts", "figure", "notes", "table"]
+
+
+def test_no_contest_no_section(results, thesis):
+    assert contest_sections.noise(Material(results, thesis)) is None
+    assert all(drawing.section != "noise" for drawing in plan(results))
+
+
+def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
+    groups = noise_groups(noise_runs(), "tiny")
+    assert len(groups) == 9
+    group = next(g for g in groups if g.parent.name == "scenenet, 60% wrong")
+    assert [child.key for child in group.children] == [
+        "noise/tiny/scenenet, 60% wrong/seed-0",
+        "noise/tiny/scenenet, 60% wrong/seed-1",
+    ]
+    assert group.parent.metrics["truth_f05"] == pytest.approx(0.505)
+    assert group.parent.metrics["truth_f05_std"] == pytest.approx(0.01 / 2**0.5)
+    assert group.children[1].metrics["truth_f05"] == pytest.approx(0.51)
+    assert group.children[1].params == {"level": 0.6, "model": "scenenet", "seed": 1}
+    assert group.parent.seconds == 4.0
+    keys = [record.key for g in groups for record in (g.parent, *g.children)]
+    assert len(set(keys)) == len(keys)

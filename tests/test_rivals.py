@@ -1,0 +1,80 @@
+"""Each rival is trained and tuned as it is elsewhere, and never on what it is scored on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenenet import blackbox
+from scenenet.blackbox import BlackBoxSettings
+from scenenet.errors import InputError
+from scenenet.metrics import ThresholdCurve, confusion
+from scenenet.modelfile import ModelCard
+from scenenet.pointcloud import PointCloud
+from scenenet.pointcloud.schemes import EDP
+from scenenet.protocol import ModelSettings, SearchSettings, TrainingSettings, TuningSettings
+from scenenet.rivals import train_rival
+from scenenet.synthetic import SyntheticSettings, corridor_cloud
+from scenenet.training import fit
+from scenenet.tuning import choose
+from scenenet.voxels import VoxelGrid, voxelise
+
+QUICK = TrainingSettings(epochs=2, learning_rate=0.01, init="field")
+FIELD = ModelSettings(
+    name="m",
+    kind="scenenet",
+    protocol="field",
+    search=SearchSettings(searches=1, trial=1, starts=8, population=6, generations=3),
+)
+MODELS = [
+    FIELD,
+    ModelSettings(name="m", kind="scenenet", kernel_size=(5, 5, 5), training=QUICK),
+    ModelSettings(name="m", kind="cnn", kernel_size=(5, 5, 5), training=QUICK),
+]
+
+
+@pytest.fixture(scope="module")
+def crops():
+    cloud, _, towers = corridor_cloud(
+        SyntheticSettings(towers=5, seed=3, density=12, tower_density=24)
+    )
+    samples = []
+    for tower in towers:
+        inside = np.hypot(*(cloud.xyz[:, :2] - (tower.x, tower.y)).T) <= tower.height
+        crop = PointCloud(cloud.xyz[inside], cloud.classification[inside], EDP)
+        samples.append(voxelise(crop, VoxelGrid.cube(crop.xyz, 32), str(tower.id)))
+    return samples
+
+
+@pytest.mark.parametrize("settings", MODELS, ids=["field", "thesis", "cnn"])
+def test_with_validation_crops_a_model_is_tuned_as_in_the_workflow(crops, settings):
+    rival = train_rival(settings, crops[:3], crops[3:4], 1)
+    model, _ = fit(crops[:3], [], settings, 1)
+    card = ModelCard(
+        name="m", codes="edp", measurement="presence", fit="cube", resolution=32, voxel_size=1.0
+    )
+    _, card, told = choose(model, card, crops[3:4], TuningSettings(), crops[:3])
+    assert rival.tau == card.threshold()
+    assert rival.f05 == told["validation"]["f05"]
+    assert rival.parameters == model.n_parameters()
+    probability, truth = rival.answer(crops[4])
+    assert rival.score(crops[4:]) == confusion(probability, truth, rival.tau)
+    curve = rival.curve(crops[4:])
+    np.testing.assert_array_equal(curve.true, ThresholdCurve.of(probability, truth).true)
+
+
+def test_without_validation_tau_is_of_the_training_crops(crops):
+    thesis = train_rival(MODELS[1], crops[:3], [], 1)
+    assert thesis.tau == thesis.curve(crops[:3]).best()[0]
+
+
+def test_the_black_box_is_never_tuned_on_what_its_trees_know(crops):
+    settings = BlackBoxSettings()
+    tuned, curve = blackbox.fit_and_tune(crops[:3], settings, 2)
+    rival = train_rival(None, crops[:3], [], 2)
+    assert (rival.tau, rival.f05) == (tuned.threshold(), curve.best()[1].f05)
+    with_validation = train_rival(None, crops[:3], crops[3:4], 2)
+    assert with_validation.tau == with_validation.curve(crops[3:4]).best()[0]
+    assert with_validation.f05 == with_validation.score(crops[3:4]).f05
+    with pytest.raises(InputError, match="two crops or more"):
+        train_rival(None, crops[:1], [], 0)

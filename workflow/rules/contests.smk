@@ -33,7 +33,13 @@ rule noise_runs:
     input:
         runs=expand(f"{R}/noise/seed-{{seed}}.csv", seed=NOISE_SEEDS),
     output:
-        runs=f"{R}/noise/runs.csv",
+        runs=shown(
+            f"{R}/noise/runs.csv",
+            "noise-runs",
+            "studies",
+            "Trainings",
+            {"table": "Trained on wrong labels, each training"},
+        ),
         provenance=f"{R}/noise/provenance.json",
     log:
         f"{R}/logs/noise/runs.log",
@@ -55,7 +61,16 @@ rule contest_figure:
     input:
         runs=f"{R}/{{contest}}/runs.csv",
     output:
-        **pictures(["{contest}"]),
+        pictures=[
+            shown(
+                f"{R}/figures/{{contest}}.png",
+                "figure-contest",
+                "studies",
+                "Figures",
+                lambda w: {"figure": TABLE_TITLES[w.contest][0]},
+            )
+        ],
+        captions=[f"{R}/figures/{{contest}}.json"],
         provenance=f"{R}/figures/{{contest}}.provenance.json",
     log:
         f"{R}/logs/contest_figure/{{contest}}.log",

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenenet.config_errors import explain
-from scenenet.contests.settings import NoiseSettings, contenders
+from scenenet.contests.settings import CrossValidationSettings, NoiseSettings, contenders
 from scenenet.crops import CropSettings
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
@@ -102,6 +102,7 @@ class Config(Settings):
     studies: tuple[StudySettings, ...] = Field(
         (), description="many small trainings that differ in one thing; config/studies.yaml"
     )
+    cross_validation: CrossValidationSettings = CrossValidationSettings()
     noise: NoiseSettings = NoiseSettings()
     detection: DetectionSettings = DetectionSettings()
     predict: Prediction = Prediction()
@@ -145,15 +146,22 @@ class Config(Settings):
                 raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
             study.plans(self.model_named(study.model), self.voxels, self.split)
         self.noise_models()
+        self.crossed_models()
         return self
 
     def noise_models(self) -> list[ModelSettings]:
         """The models that are trained on wrong labels."""
         return contenders(self.noise.contenders, self.models, "noise.contenders")
 
+    def crossed_models(self) -> list[ModelSettings]:
+        """The models that are cross-validated."""
+        told = self.cross_validation.contenders
+        return contenders(told, self.models, "cross_validation.contenders")
+
     def contests(self) -> list[str]:
         """Names of the contests that are held (``scenenet.contests``)."""
-        return ["noise"] if self.noise.levels else []
+        held = {"cross_validation": self.cross_validation.leave_out, "noise": self.noise.levels}
+        return [name for name, wanted in held.items() if wanted]
 
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)

@@ -73,6 +73,17 @@ class NoiseSettings(Settings):
         return line.model_copy(update={"seed": line.seed + seed})
 
 
+class CrossValidationSettings(Settings):
+    """Every crop once a test crop, where crops are too few for one split to say much."""
+
+    leave_out: int = Field(
+        0, ge=0, description="crops left out at a time, in the order of their names; 0 for none"
+    )
+    contenders: tuple[Contender, ...] = Field(
+        (), description="models that take part beside the black box; none for every model"
+    )
+
+
 def contenders(
     told: Sequence[Contender], models: Sequence[ModelSettings], place: str
 ) -> list[ModelSettings]:

@@ -5,6 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from scenenet.contests.cross_table import summarise_folds
 from scenenet.contests.noise_table import LABELS, summarise_noise
 from scenenet.figures.style import COLOURS, new_figure, save
 from scenenet.results import Results
@@ -13,7 +16,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 PANELS = {"labels_f05": "against the labels it was given", "truth_f05": "against the truth"}
-LABELS_COLOUR = "#222222"
+MEASURES = {"precision": "precision", "recall": "recall", "f05": "F0.5"}
+LABELS_COLOUR, FOLD_COLOUR = "#222222", "#777777"
 
 
 def noise(summary: pd.DataFrame, out: str | Path) -> str:
@@ -64,5 +68,53 @@ def draw_noise(results: Results, out: Path) -> tuple[str, str]:
     )
 
 
-CONTEST_DRAWINGS = {"noise": ("Trained on wrong labels", draw_noise)}
+def cross_validation(runs: pd.DataFrame, out: str | Path) -> str:
+    """Precision, recall and F0.5 of each model, and F0.5 of each of its folds.
+
+    Args:
+        runs: of ``scenenet.contests.cross_validation``.
+        out: PNG to write.
+    """
+    summary = summarise_folds(runs)
+    places = np.arange(len(summary))
+    figure, axes = new_figure(1, 1, width=7.2, height=0.6 * len(summary) + 1.5)
+    axis = axes[0, 0]
+    for i, (name, label) in enumerate(MEASURES.items()):
+        at = places + 0.2 * (i - 1)
+        spread = summary[f"{name}_std"].fillna(0)
+        axis.errorbar(summary[name], at, xerr=spread, fmt="o", ms=6, capsize=3, color=COLOURS[i],
+                      label=label)  # fmt: skip
+    folds = runs.groupby(["model", "fold"], sort=False)["f05"].mean()
+    for place, model in zip(places, summary["model"], strict=True):
+        of_model = folds[model]
+        axis.plot(of_model, np.full(len(of_model), place + 0.36), "|", ms=7, mew=1.5,
+                  color=FOLD_COLOUR, label="F0.5 of a fold" if place == 0 else None)  # fmt: skip
+    axis.set_yticks(places, summary["model"])
+    axis.set(xlabel="score, mean over folds and its spread over seeds", xlim=(-0.02, 1.02))
+    axis.invert_yaxis()
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    save(figure, out)
+    said = "; ".join(
+        f"{row.model}: precision {row.precision:.2f}, recall {row.recall:.2f}, F0.5 {row.f05:.2f}, "
+        f"its folds from {row.worst_fold_f05:.2f} to {row.best_fold_f05:.2f}"
+        for row in summary.itertuples()
+    )
+    return f"Points for the cross-validated scores of each model. {said}."
+
+
+def draw_cross_validation(results: Results, out: Path) -> tuple[str, str]:
+    runs = results.contest_runs("cross_validation")
+    alt = cross_validation(runs, out)
+    row = summarise_folds(runs).iloc[0]
+    return alt, (
+        f"Each of {row['crops']} crops is left out once, in {row['n_folds']} folds; models are "
+        "trained and tuned on the others. Points: means over the folds; bars: standard deviation "
+        f"of that mean over {row['n_seeds']} seeds; strokes: F0.5 of each fold, mean over seeds."
+    )
+
+
+CONTEST_DRAWINGS = {
+    "cross_validation": ("Every crop a test crop once", draw_cross_validation),
+    "noise": ("Trained on wrong labels", draw_noise),
+}
 """Title and drawing of each contest."""

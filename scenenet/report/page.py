@@ -28,6 +28,7 @@ HERE = Path(__file__).parent
 
 SECTIONS: Sequence[SectionMaker] = (
     overview.overview,
+    contest_sections.cross_validation,
     model_sections.models,
     model_sections.positions,
     model_sections.learned,

@@ -4,10 +4,12 @@ seed, with the same names of metrics."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scenenet.contests.cross_table import SCORES, summarise_folds
 from scenenet.contests.noise_table import LABELS
 from scenenet.tracking.runs import RunGroup, RunRecord
 
@@ -37,6 +39,33 @@ def noise_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
         groups.append(
             group_of("noise", dataset, f"{model}, {level:.0%} wrong", case, rows, told, "5.2.5")
         )
+    return groups
+
+
+def fold_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
+    """The runs of the cross-validation: a parent for each model, a run for each seed and fold.
+
+    Args:
+        runs: of ``scenenet.contests.cross_validation``.
+        dataset: name of the data, as for ``noise_groups``.
+    """
+    summary = summarise_folds(runs).set_index("model")
+    groups = []
+    for model, rows in runs.groupby("model", sort=False):
+        row = summary.loc[model]
+        told = (
+            f"Cross-validated over {row['crops']} crops in {row['n_folds']} folds. Means over "
+            "folds and seeds; spread_ is that of the mean over folds over the seeds, pooled_ of "
+            "the counts of all folds together."
+        )
+        group = group_of(
+            "cross_validation", dataset, str(model), {"model": str(model)}, rows, told, "5.2.4",
+            lambda row: f"seed-{row['seed']}/fold-{row['fold']}",
+        )  # fmt: skip
+        more = {f"spread_{name}": _number(row[f"{name}_std"]) for name in SCORES}
+        more |= {f"pooled_{name}": _number(row[f"pooled_{name}"]) for name in SCORES}
+        parent = replace(group.parent, metrics={**group.parent.metrics, **more})
+        groups.append(replace(group, parent=parent))
     return groups
 
 
@@ -106,6 +135,7 @@ def _means(children: Sequence[RunRecord]) -> dict[str, float | None]:
 
 
 CONTEST_GROUPS: Mapping[str, Callable[[pd.DataFrame, str], list[RunGroup]]] = {
+    "cross_validation": fold_groups,
     "noise": noise_groups,
 }
 """The runs of each contest, by its name."""

@@ -7,13 +7,14 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from scenenet.contests import cross_validation
 from scenenet.contests.noise import COLUMNS
 from scenenet.contests.noise_table import LABELS
 from scenenet.figures import draw_all, plan
 from scenenet.report import contest_sections
 from scenenet.report.material import Material
 from scenenet.tables import write_tables
-from scenenet.tracking.contests import noise_groups
+from scenenet.tracking.contests import fold_groups, noise_groups
 
 
 def noise_runs() -> pd.DataFrame:
@@ -70,3 +71,47 @@ def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
     assert group.parent.seconds == 4.0
     keys = [record.key for g in groups for record in (g.parent, *g.children)]
     assert len(set(keys)) == len(keys)
+
+
+def crossed_runs() -> pd.DataFrame:
+    rows = []
+    for model, base in (("scenenet", 0.7), ("cnn", 0.3), ("black box", 0.8)):
+        for seed in (0, 1):
+            for fold, crops in ((1, "a b"), (2, "c d")):
+                row = dict.fromkeys(cross_validation.COLUMNS, 0.5)
+                row |= {"model": model, "seed": seed, "fold": fold, "crops": crops, "alive": True}
+                row |= {"f05": base + seed / 50 + fold / 10, "tp": 5, "fp": 1, "fn": 4, "tn": 90}
+                rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def test_cross_validation_is_the_main_result_where_it_is_there(results, thesis):
+    (results.folder / "cross_validation").mkdir()
+    crossed_runs().to_csv(results.folder / "cross_validation" / "runs.csv", index=False)
+    crossed = replace(results, contests=("cross_validation",))
+    write_tables(crossed, thesis, crossed.folder / "tables", names=())
+    (drawing,) = [d for d in plan(crossed) if d.section == "cross_validation"]
+    (picture,) = draw_all([drawing], crossed.folder / "figures")
+    assert picture.file.stat().st_size > 5000
+    assert "its folds from 0.81 to 0.91" in picture.alt
+    section = contest_sections.cross_validation(Material(crossed, thesis))
+    assert section is not None and section.title.startswith("Main result")
+    assert "black box 0.960, scenenet 0.860, cnn 0.460" in section.blocks[0].text
+    assert [block.kind for block in section.blocks] == ["text", "facts", "figure", "table"]
+    assert contest_sections.cross_validation(Material(results, thesis)) is not None
+    (results.folder / "tables" / "cross_validation.csv").unlink()
+    assert contest_sections.cross_validation(Material(results, thesis)) is None
+
+
+def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():
+    (group, *_) = groups = fold_groups(crossed_runs(), "ts40k")
+    assert [g.parent.name for g in groups] == ["scenenet", "cnn", "black box"]
+    assert [child.key for child in group.children] == [
+        f"cross_validation/ts40k/scenenet/seed-{seed}/fold-{fold}"
+        for seed in (0, 1)
+        for fold in (1, 2)
+    ]
+    assert group.parent.metrics["f05"] == pytest.approx(0.86)
+    assert group.parent.metrics["spread_f05"] == pytest.approx(0.02 / 2**0.5)
+    assert group.parent.metrics["pooled_precision"] == pytest.approx(5 / 6)
+    assert group.children[1].params["crops"] == "c d"

@@ -1,6 +1,73 @@
 """Contests: SCENE-Net and its rivals on the same crops (thesis 5.2.4, 5.2.5)."""
 
+# No model can be called so: its name has no dot.
+BLACK_BOX_RIVAL = "black.box"
+CROSSED = {
+    **{model.name: model.model_dump(mode="json") for model in settings.crossed_models()},
+    BLACK_BOX_RIVAL: None,
+}
 NOISE_SEEDS = settings.noise.seeds if "noise" in CONTESTS else []
+
+
+rule cross_validate:
+    input:
+        stores=VOXEL_STORES,
+        manifests=VOXEL_MANIFESTS,
+    output:
+        runs=f"{R}/cross_validation/{{rival}}/runs.csv",
+        provenance=f"{R}/cross_validation/{{rival}}/provenance.json",
+    log:
+        f"{R}/logs/cross_validation/{{rival}}.log",
+    benchmark:
+        f"{R}/benchmarks/cross_validation/{{rival}}.tsv"
+    wildcard_constraints:
+        rival=any_of(CROSSED),
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=600,
+    params:
+        job=lambda w: job(
+            "cross_validate",
+            {
+                "leave_out": settings.cross_validation.leave_out,
+                "neighbour": settings.split.neighbour,
+            },
+            model=CROSSED[w.rival],
+            seeds=list(settings.seeds),
+        ),
+    message:
+        "Cross-validating {wildcards.rival}"
+    script:
+        "../scripts/cross_validate.py"
+
+
+rule cross_validation_runs:
+    input:
+        runs=expand(f"{R}/cross_validation/{{rival}}/runs.csv", rival=CROSSED),
+    output:
+        runs=shown(
+            f"{R}/cross_validation/runs.csv",
+            "cross_validation-runs",
+            "models",
+            "Trainings",
+            {"table": "Every crop a test crop once, each training"},
+        ),
+        provenance=f"{R}/cross_validation/provenance.json",
+    log:
+        f"{R}/logs/cross_validation/runs.log",
+    benchmark:
+        f"{R}/benchmarks/cross_validation/runs.tsv"
+    threads: 1
+    resources:
+        mem_mb=500,
+        runtime=5,
+    params:
+        job=job("contest_runs", {}),
+    message:
+        "Putting the folds of all models together"
+    script:
+        "../scripts/contest_runs.py"
 
 
 rule noise:

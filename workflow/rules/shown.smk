@@ -27,6 +27,7 @@ TABLE_TITLES = {
     "tower_scores": ("Towers found", "models"),
     "times": ("Times", "models"),
     "thesis_and_ours": ("The thesis and ours", "models"),
+    "cross_validation": ("Every crop a test crop once", "models"),
     "noise": ("Trained on wrong labels", "studies"),
     "classes": ("Points of each class", "data"),
     "towers": ("Labelled towers", "data"),

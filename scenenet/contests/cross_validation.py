@@ -1,0 +1,95 @@
+"""Every crop is a test crop once: what a split of a handful of crops cannot tell.
+
+tau is chosen on the training crops of the fold, and nothing is chosen on those left out
+(docs/accuracy.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenenet.contests.folds import folds
+from scenenet.files import atomic
+from scenenet.progress import track
+from scenenet.protocol import ModelSettings
+from scenenet.results import BLACK_BOX
+from scenenet.rivals import train_rival
+from scenenet.voxel_store import Dataset, load
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = (
+    "model", "seed", "fold", "crops", "training_crops", "alive", "tau", "precision", "recall",
+    "f05", "iou_tower", "miou", "tp", "fp", "fn", "tn", "training_f05", "parameters",
+    "training_seconds",
+)  # fmt: skip
+
+
+def cross_validate(
+    voxel_manifests: Sequence[str | Path],
+    model: ModelSettings | None,
+    seeds: Sequence[int],
+    leave_out: int,
+    neighbour: float,
+    out: str | Path,
+) -> pd.DataFrame:
+    """Train one model from every seed on every fold, score it on the crops left out, and write a
+    row for each.
+
+    Args:
+        voxel_manifests: of the voxel stores.
+        model: what is trained; None for the black box.
+        leave_out, neighbour: as ``scenenet.contests.folds``.
+        out: CSV file, columns ``COLUMNS``; ``training_f05`` is on the crops that tau was chosen on.
+
+    Returns:
+        what was written.
+
+    Raises:
+        InputError: there are too few crops, or none with a tower to learn from.
+    """
+    import pandas as pd
+
+    table = pd.DataFrame(run_folds(load(voxel_manifests), model, seeds, leave_out, neighbour))
+    with atomic(out) as partial:
+        table[list(COLUMNS)].to_csv(partial, index=False, float_format="%.6g")
+    return table[list(COLUMNS)]
+
+
+def run_folds(
+    dataset: Dataset,
+    model: ModelSettings | None,
+    seeds: Sequence[int],
+    leave_out: int,
+    neighbour: float,
+) -> list[dict[str, Any]]:
+    """The rows of ``cross_validate``."""
+    name = BLACK_BOX if model is None else model.name
+    parts = folds(dataset.crops, leave_out, neighbour)
+    plans = [(seed, number, fold) for seed in seeds for number, fold in enumerate(parts, start=1)]
+    rows = []
+    for seed, number, fold in track(plans, f"{name}: folds"):
+        training = [dataset.samples[i] for i in fold.learnt]
+        left_out = [dataset.samples[i] for i in fold.out]
+        rival = train_rival(model, training, [], seed)
+        counts = rival.score(left_out)
+        rows.append(
+            {
+                "model": name,
+                "seed": seed,
+                "fold": number,
+                "crops": " ".join(sample.id for sample in left_out),
+                "training_crops": len(training),
+                "alive": counts.tp > 0,
+                "tau": rival.tau,
+                **counts.scores(),
+                **{part: getattr(counts, part) for part in ("tp", "fp", "fn", "tn")},
+                "training_f05": rival.f05,
+                "parameters": rival.parameters,
+                "training_seconds": rival.seconds,
+            }
+        )
+    return rows

@@ -6,6 +6,7 @@ from as well, the black box never on those.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -14,10 +15,11 @@ import numpy as np
 
 from scenenet import blackbox
 from scenenet.blackbox import BlackBoxSettings
-from scenenet.metrics import Confusion, ThresholdCurve, confusion
+from scenenet.metrics import THRESHOLDS, Confusion, ThresholdCurve, confusion
+from scenenet.models import new_model
 from scenenet.protocol import ModelSettings
 from scenenet.search import best_step
-from scenenet.training import fit, probabilities, threshold_curve
+from scenenet.training import LostTraining, fit, probabilities, threshold_curve
 from scenenet.voxels import VoxelSample
 
 Answer = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
@@ -84,9 +86,14 @@ def train_model(
     validation: Sequence[VoxelSample],
     seed: int,
 ) -> Rival:
-    """A SCENE-Net or a CNN; as ``train_rival``."""
+    """A SCENE-Net or a CNN; as ``train_rival``. One that loses its way finds nothing."""
     begin = time.perf_counter()
-    model, _ = fit(training, [], settings, seed)
+    try:
+        model, _ = fit(training, [], settings, seed)
+    except LostTraining as error:
+        print(error, file=sys.stderr)
+        n, seconds = new_model(settings, seed).n_parameters(), time.perf_counter() - begin
+        return Rival(_nothing, float(THRESHOLDS[-1]), 0.0, n, seconds)
     if model.field is None:
         curve = threshold_curve(model, validation or training, settings.measurement)
         tau, counts = curve.best()
@@ -103,6 +110,10 @@ def train_model(
         return probabilities(model, sample, settings.measurement)
 
     return Rival(answer, tau, counts.f05, model.n_parameters(), time.perf_counter() - begin)
+
+
+def _nothing(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
+    return sample.spread(np.zeros(len(sample.index), np.float32))
 
 
 def train_black_box(

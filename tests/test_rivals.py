@@ -78,3 +78,14 @@ def test_the_black_box_is_never_tuned_on_what_its_trees_know(crops):
     assert with_validation.f05 == with_validation.score(crops[3:4]).f05
     with pytest.raises(InputError, match="two crops or more"):
         train_rival(None, crops[:1], [], 0)
+
+
+def test_a_training_that_loses_its_way_finds_nothing(crops):
+    wild = TrainingSettings(epochs=3, learning_rate=1e30, optimiser="sgd")
+    settings = ModelSettings(name="m", kind="cnn", kernel_size=(3, 3, 3), training=wild)
+    rival = train_rival(settings, crops[:3], [], 0)
+    assert rival.f05 == 0
+    counts = rival.score(crops)
+    assert (counts.tp, counts.fp) == (0, 0)
+    assert counts.fn == sum(int(sample.tower.sum()) for sample in crops)
+    assert rival.parameters == 3 * 27 + 3

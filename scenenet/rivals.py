@@ -15,6 +15,8 @@ import numpy as np
 
 from scenenet import blackbox
 from scenenet.blackbox import BlackBoxSettings
+from scenenet.detection import DetectionSettings
+from scenenet.evaluation import find_in_crop
 from scenenet.metrics import THRESHOLDS, Confusion, ThresholdCurve, confusion
 from scenenet.models import new_model
 from scenenet.protocol import ModelSettings
@@ -49,6 +51,17 @@ class Rival:
         total = Confusion()
         for sample in samples:
             total += confusion(*self.answer(sample), self.tau)
+        return total
+
+    def score_towers(
+        self, samples: Iterable[VoxelSample], detection: DetectionSettings
+    ) -> Confusion:
+        """The same of the voxels of whole towers that are found (docs/towers.md)."""
+        total = Confusion()
+        for sample in samples:
+            probability, truth = self.answer(sample)
+            _, theirs = find_in_crop(sample, probability, self.tau, detection)
+            total += confusion(sample.spread(theirs)[0], truth, 0.5)
         return total
 
     def curve(self, samples: Iterable[VoxelSample]) -> ThresholdCurve:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenenet.contests.folds import folds
+from scenenet.detection import DetectionSettings
 from scenenet.files import atomic
 from scenenet.progress import track
 from scenenet.protocol import ModelSettings
@@ -27,6 +28,9 @@ COLUMNS = (
     "training_seconds",
 )  # fmt: skip
 
+WHOLE_TOWERS = ", whole towers"
+"""Behind the name of a model: its voxels are those of the towers that are found with it."""
+
 
 def cross_validate(
     voxel_manifests: Sequence[str | Path],
@@ -34,15 +38,17 @@ def cross_validate(
     seeds: Sequence[int],
     leave_out: int,
     neighbour: float,
+    detection: DetectionSettings,
     out: str | Path,
 ) -> pd.DataFrame:
-    """Train one model from every seed on every fold, score it on the crops left out, and write a
-    row for each.
+    """Train one model from every seed on every fold, score it on the crops left out, and write two
+    rows for each: of the voxels that reach tau, and of those of whole towers.
 
     Args:
         voxel_manifests: of the voxel stores.
         model: what is trained; None for the black box.
         leave_out, neighbour: as ``scenenet.contests.folds``.
+        detection: what makes a tower; the same for every model.
         out: CSV file, columns ``COLUMNS``; ``training_f05`` is on the crops that tau was chosen on.
 
     Returns:
@@ -53,7 +59,9 @@ def cross_validate(
     """
     import pandas as pd
 
-    table = pd.DataFrame(run_folds(load(voxel_manifests), model, seeds, leave_out, neighbour))
+    table = pd.DataFrame(
+        run_folds(load(voxel_manifests), model, seeds, leave_out, neighbour, detection)
+    )
     with atomic(out) as partial:
         table[list(COLUMNS)].to_csv(partial, index=False, float_format="%.6g")
     return table[list(COLUMNS)]
@@ -65,6 +73,7 @@ def run_folds(
     seeds: Sequence[int],
     leave_out: int,
     neighbour: float,
+    detection: DetectionSettings,
 ) -> list[dict[str, Any]]:
     """The rows of ``cross_validate``."""
     name = BLACK_BOX if model is None else model.name
@@ -75,21 +84,19 @@ def run_folds(
         training = [dataset.samples[i] for i in fold.learnt]
         left_out = [dataset.samples[i] for i in fold.out]
         rival = train_rival(model, training, [], seed)
-        counts = rival.score(left_out)
-        rows.append(
-            {
-                "model": name,
-                "seed": seed,
-                "fold": number,
-                "crops": " ".join(sample.id for sample in left_out),
-                "training_crops": len(training),
-                "alive": counts.tp > 0,
-                "tau": rival.tau,
-                **counts.scores(),
-                **{part: getattr(counts, part) for part in ("tp", "fp", "fn", "tn")},
-                "training_f05": rival.f05,
-                "parameters": rival.parameters,
-                "training_seconds": rival.seconds,
-            }
-        )
+        shared = {
+            "seed": seed,
+            "fold": number,
+            "crops": " ".join(sample.id for sample in left_out),
+            "training_crops": len(training),
+            "tau": rival.tau,
+            "training_f05": rival.f05,
+            "parameters": rival.parameters,
+            "training_seconds": rival.seconds,
+        }
+        reached, whole = rival.score(left_out), rival.score_towers(left_out, detection)
+        for called, counts in ((name, reached), (name + WHOLE_TOWERS, whole)):
+            cells = {part: getattr(counts, part) for part in ("tp", "fp", "fn", "tn")}
+            alive = {"alive": counts.tp > 0}
+            rows.append({"model": called, **shared, **alive, **counts.scores(), **cells})
     return rows

@@ -7,15 +7,22 @@ import pandas as pd
 import pytest
 
 from scenenet.contests.cross_table import summarise_folds
-from scenenet.contests.cross_validation import COLUMNS, cross_validate, run_folds
+from scenenet.contests.cross_validation import (
+    COLUMNS,
+    WHOLE_TOWERS,
+    cross_validate,
+    run_folds,
+)
 from scenenet.contests.folds import folds
 from scenenet.crops import CropSettings, crop_of, cut_crops
+from scenenet.detection import DetectionSettings
 from scenenet.rivals import train_rival
 from scenenet.synthetic import SyntheticSettings, make_survey
 from scenenet.towers import TowerSettings, survey_towers
 from scenenet.voxel_store import build, load
 from scenenet.voxels import VoxelSettings
 
+DETECTION = DetectionSettings()
 GRID = VoxelSettings(resolution=32)
 
 
@@ -36,8 +43,10 @@ def manifest(tmp_path_factory):
 
 def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     thesis = models[1]
-    table = cross_validate([manifest], thesis, (0, 1), 2, 0.0, tmp_path / "runs.csv")
-    assert tuple(pd.read_csv(tmp_path / "runs.csv").columns) == COLUMNS == tuple(table.columns)
+    both = cross_validate([manifest], thesis, (0, 1), 2, 0.0, DETECTION, tmp_path / "runs.csv")
+    assert tuple(pd.read_csv(tmp_path / "runs.csv").columns) == COLUMNS == tuple(both.columns)
+    of_towers = both["model"] == thesis.name + WHOLE_TOWERS
+    table, whole = both[~of_towers], both[of_towers]
     dataset = load([manifest])
     names = sorted(sample.id for sample in dataset.samples)
     assert list(table["seed"]) == [0, 0, 0, 1, 1, 1]
@@ -50,10 +59,13 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     counts = rival.score(out)
     assert (row["tau"], row["f05"], row["tp"]) == (rival.tau, counts.f05, counts.tp)
     assert row["tp"] + row["fn"] == sum(int(sample.tower.sum()) for sample in out)
+    row = whole[(whole["seed"] == 1) & (whole["fold"] == 2)].iloc[0]
+    counts = rival.score_towers(out, DETECTION)
+    assert (row["tau"], row["f05"], row["tp"]) == (rival.tau, counts.f05, counts.tp)
 
 
 def test_the_black_box_takes_part(manifest):
-    (row, *_) = run_folds(load([manifest]), None, (0,), 3, 0.0)
+    (row, *_) = run_folds(load([manifest]), None, (0,), 3, 0.0, DETECTION)
     assert row["model"] == "black box"
     assert row["training_crops"] == 3
     assert 0 < row["tau"] < 1

@@ -32,6 +32,7 @@ rule cross_validate:
             {
                 "leave_out": settings.cross_validation.leave_out,
                 "neighbour": settings.split.neighbour,
+                "detection": SETTINGS["detection"],
             },
             model=CROSSED[w.rival],
             seeds=list(settings.seeds),

@@ -5,6 +5,7 @@ import adapter
 
 def cross_validate(job: adapter.Job) -> None:
     from scenenet.contests.cross_validation import cross_validate
+    from scenenet.detection import DetectionSettings
     from scenenet.protocol import ModelSettings
 
     model = job.identity["model"]
@@ -14,6 +15,7 @@ def cross_validate(job: adapter.Job) -> None:
         job.identity["seeds"],
         job.settings["leave_out"],
         job.settings["neighbour"],
+        DetectionSettings(**job.settings["detection"]),
         job.output.runs,
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -186,24 +187,38 @@ def evaluate_black_box(
     detection: DetectionSettings,
     seeds: Sequence[int],
     outs: Sequence[str | Path],
+    out_times: str | Path,
 ) -> None:
     """Train the black box from each seed, tune it on validation and score it on the test crops.
 
     Args:
         outs: JSON file of each seed: what ``score_answers`` says, and ``parameters``.
+        out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels an edge
+            (``scenenet.model_times``), ``peak_memory_mb`` of all of this.
     """
     from scenenet import blackbox
     from scenenet.files import write_json
+    from scenenet.memory import used
+    from scenenet.model_times import CROPS, milliseconds
 
     parts = {
         part: load(voxel_manifests, crops_in(split, part))
         for part in ("train", "validation", "test")
     }
+    seconds: list[float] = []
+    took: dict[str, float] = {}
     for seed, out in zip(seeds, outs, strict=True):
+        begin = time.perf_counter()
         grown = blackbox.fit(parts["train"].samples, blackbox.BlackBoxSettings(), seed)
+        seconds.append(time.perf_counter() - begin)
         model = blackbox.tune(grown, parts["validation"].samples)
         tau = model.threshold()
         scores = score_answers(
             "black box", seed, tau, model.probabilities, parts["test"], detection
         )
         write_json(out, {"part": "test", "parameters": model.n_parameters()} | scores)
+        if not took:
+            timed = sorted(parts["test"].samples, key=lambda sample: sample.id)[:CROPS]
+            edge = str(max(timed[0].grid.shape))
+            took = {edge: milliseconds(model.probabilities, timed)}
+    write_json(out_times, {"training_seconds": seconds, "inference_ms": took} | used())

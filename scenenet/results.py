@@ -36,6 +36,7 @@ class SeedResult:
         tuning: tau and the scores on the validation crops; None before tuning.
         history: one row per epoch; None if the model was not trained here.
         provenance: what the training was made from.
+        resources: what the training used (``scenenet.memory.used``).
         model_files: the tuned model, one file or two (weights apart).
     """
 
@@ -46,6 +47,7 @@ class SeedResult:
     tuning: Mapping[str, Any] | None = None
     history: pd.DataFrame | None = None
     provenance: Mapping[str, Any] | None = None
+    resources: Mapping[str, Any] | None = None
     model_files: tuple[Path, ...] = ()
 
     @property
@@ -86,6 +88,7 @@ class Results:
         predicted: surveys that were classified.
         studies: what was studied beside.
         contests: which of ``scenenet.contests`` were held.
+        predicts: the model that classifies surveys; the first SCENE-Net where none is named.
     """
 
     folder: Path
@@ -95,9 +98,19 @@ class Results:
     predicted: Sequence[str] = ()
     studies: Sequence[StudySettings] = ()
     contests: Sequence[str] = ()
+    predicts: str | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", Path(self.folder))
+
+    @property
+    def predicting(self) -> str | None:
+        """The model that pictures and the opening of the page are about; None without models."""
+        scenenets = [model for model, kind in self.models.items() if kind == "scenenet"]
+        named = [] if self.predicts is None else [self.predicts]
+        return next(
+            (name for name in [*named, *scenenets, *self.models] if name in self.models), None
+        )
 
     @cached_property
     def trained(self) -> list[SeedResult]:
@@ -127,6 +140,7 @@ class Results:
         evaluation = read_result(self._evaluation(model, seed))
         tuning = self.folder / "tune" / model / f"seed-{seed}.json"
         history, provenance = training / "history.csv", training / "provenance.json"
+        resources = training / "resources.json"
         return SeedResult(
             model=model,
             kind=self.models[model],
@@ -135,13 +149,25 @@ class Results:
             tuning=read_result(tuning) if tuning.exists() else None,
             history=read_table(history) if history.exists() else None,
             provenance=read_result(provenance) if provenance.exists() else None,
+            resources=read_result(resources) if resources.exists() else None,
             model_files=self._files("models", model, f"seed-{seed}"),
         )
 
     def scene(self, rank: str) -> Mapping[str, Any] | None:
         """The best, median or worst test crop as voxels; None if it was not made."""
-        path = self.folder / "scenes" / f"{rank}.json"
-        return read_result(path) if path.exists() else None
+        return self._if_there("scenes", f"{rank}.json")
+
+    def certificate(self, model: str) -> Mapping[str, Any] | None:
+        """Which promises of a GENEO a model keeps; None if it was not asked."""
+        return self._if_there("certificates", f"{model}.json")
+
+    def timing(self, model: str) -> Mapping[str, Any] | None:
+        """How long a model takes for a crop; None if it was not timed."""
+        return self._if_there("times", f"{model}.json")
+
+    def black_box_times(self) -> Mapping[str, Any] | None:
+        """How long the black box takes to train and to answer a crop."""
+        return self._if_there("black_box", "times.json")
 
     @cached_property
     def black_box(self) -> list[SeedResult]:
@@ -213,6 +239,10 @@ class Results:
             if not unfinished and place.parts[0] not in ("report", "mlflow"):
                 found.append((place.as_posix(), read_result(path)))
         return found
+
+    def _if_there(self, stage: str, name: str) -> Mapping[str, Any] | None:
+        path = self.folder / stage / name
+        return read_result(path) if path.exists() else None
 
     def _evaluation(self, model: str, seed: int) -> Path:
         return self.folder / "evaluate" / model / f"seed-{seed}.json"

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from scenenet.contests.tables import CONTEST_TABLES
 from scenenet.files import atomic
+from scenenet.model_tables import certificate, parameters, times, turns
 from scenenet.published import Published, Thesis
 from scenenet.results import BLACK_BOX, Results, SeedResult
 from scenenet.studies.summary import summarise
@@ -196,27 +197,6 @@ def tower_scores(results: Results, thesis: Thesis | None = None) -> pd.DataFrame
     return pd.DataFrame(rows, columns=columns)
 
 
-def times(results: Results, thesis: Thesis) -> pd.DataFrame:
-    """Training time of one seed (thesis 5.2.6), whatever machine this ran on."""
-    import pandas as pd
-
-    columns = ["model", "n_seeds", "epochs", "training_seconds", "training_seconds_std",
-               "seconds_per_epoch", "thesis_training_seconds"]  # fmt: skip
-    minutes = thesis.value("times.training")
-    rows = []
-    for model in results.models:
-        timed = [r for r in results.of_model(model) if r.seconds is not None]
-        if not timed:
-            continue
-        seconds = pd.Series([r.seconds for r in timed], dtype=float)
-        epochs = pd.Series([r.epochs for r in timed], dtype=float)
-        mean_and_std = (seconds.mean(), seconds.std())
-        per_epoch = seconds.sum() / epochs.sum()
-        published = None if minutes is None else 60 * minutes
-        rows.append((model, len(timed), epochs.mean(), *mean_and_std, per_epoch, published))
-    return pd.DataFrame(rows, columns=columns)
-
-
 TOWER_SCORES = ("precision", "recall", "median_error_m", "n_true", "n_predicted")
 
 TABLES: Mapping[str, Callable[[Results, Thesis], pd.DataFrame]] = {
@@ -227,6 +207,9 @@ TABLES: Mapping[str, Callable[[Results, Thesis], pd.DataFrame]] = {
     "seeds": seeds,
     "tower_scores": tower_scores,
     "times": times,
+    "parameters": parameters,
+    "certificate": certificate,
+    "certificate_turns": turns,
 }
 """Every table by the stem of its file. A new one is added here and the report finds it."""
 

@@ -1,4 +1,4 @@
-"""Lines and bars: training, precision and recall, kernels, parameters.
+"""Lines: training, precision and recall.
 
 Every function draws plain data into one PNG and returns the alternative text of what it drew, with
 the numbers a person would read off, for those who cannot see it.
@@ -125,62 +125,6 @@ def precision_recall(
     legend(axis)
     save(figure, out)
     return f"Precision-recall curves on the test crops: {'; '.join(summary)}."
-
-
-def kernels(weights: Mapping[str, np.ndarray], out: str | Path) -> str:
-    """Slices through the middle of each kernel (thesis Figures 4.2 to 4.4).
-
-    Args:
-        weights: name -> (kz, ky, kx). The upper row shows z against x, the lower y against x.
-        out: PNG to write.
-    """
-    figure, axes = new_figure(2, len(weights), width=2.6 * len(weights) + 0.4, height=5.2)
-    for column, (name, kernel) in enumerate(weights.items()):
-        kz, ky, _ = kernel.shape
-        # Each kernel has its own scale: a shape of small weights would else not show.
-        limit = float(np.abs(kernel).max()) or 1.0
-        style = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit, "origin": "lower"}
-        image = axes[0, column].imshow(kernel[:, (ky - 1) // 2, :], **style)
-        axes[1, column].imshow(kernel[(kz - 1) // 2], **style)
-        axes[0, column].set(title=readable(name), xlabel="x [voxel]", ylabel="z [voxel]")
-        axes[1, column].set(xlabel="x [voxel]", ylabel="y [voxel]")
-        figure.colorbar(image, ax=axes[:, column], location="bottom", shrink=0.8, pad=0.02)
-    for axis in axes.flat:
-        axis.grid(False)
-    save(figure, out)
-    extent = "; ".join(f"{n} from {k.min():.3g} to {k.max():.3g}" for n, k in weights.items())
-    return f"Middle slices of the kernels, side view above and top view below. Weights: {extent}."
-
-
-def parameters(values: Mapping[str, Sequence[float]], out: str | Path) -> str:
-    """The learned parameters with their spread over seeds (thesis Figure 5.5).
-
-    Args:
-        values: parameter, such as ``cylinder.r`` -> one value per seed.
-        out: PNG to write. Mixing weights (``lambda.``) have a panel of their own: they are shares,
-            the others lengths in voxels or numbers without unit.
-    """
-    shapes = {n: v for n, v in values.items() if not n.startswith("lambda.")}
-    weights = {n: v for n, v in values.items() if n.startswith("lambda.")}
-    panels = [p for p in (shapes, weights) if p]
-    ratios = [len(p) for p in panels]
-    figure, axes = new_figure(
-        len(panels), 1, width=7.2, height=0.42 * sum(ratios) + 1.2, height_ratios=ratios
-    )
-    for axis, panel, colour in zip(axes[:, 0], panels, COLOURS, strict=False):
-        places = np.arange(len(panel))
-        means = [np.mean(v) for v in panel.values()]
-        spread = [np.std(v, ddof=1) if len(v) > 1 else 0 for v in panel.values()]
-        axis.barh(places, means, xerr=spread, color=colour, alpha=0.45, capsize=3)
-        for place, of_seeds in zip(places, panel.values(), strict=True):
-            axis.plot(of_seeds, np.full(len(of_seeds), place), "o", color=colour, ms=3.5)
-        axis.set_yticks(places, [readable(name) for name in panel])
-        axis.axvline(0, color="#444", lw=0.8)
-        axis.invert_yaxis()
-        axis.set_xlabel("mixing weight" if panel is weights else "value (voxels where a length)")
-    save(figure, out)
-    means_text = ", ".join(f"{name} {np.mean(v):.3g}" for name, v in values.items())
-    return f"Bars of the mean learned parameters with a dot for each seed: {means_text}."
 
 
 def _precision_at(curve: Curve, recall: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ Every function that draws writes one PNG and returns (alternative text, caption)
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from scenenet.figures.chosen import champion_of
 from scenenet.published import Thesis
 from scenenet.results import Results, parameter_columns
 from scenenet.studies.settings import StudySettings
+
+if TYPE_CHECKING:
+    from scenenet.models import VoxelModel
 
 
 def draw_curves(results: Results, thesis: Thesis | None, out: Path) -> tuple[str, str]:
@@ -62,44 +65,66 @@ def draw_paths(results: Results, model: str, out: Path) -> tuple[str, str]:
 
 
 def draw_kernels(results: Results, model: str, out: Path) -> tuple[str, str]:
-    import torch
-
-    from scenenet.figures.charts import kernels
+    from scenenet.figures.numbers import kernels
     from scenenet.modelfile import read_model
-    from scenenet.models import CNN, SceneNet
+    from scenenet.models import SceneNet
+    from scenenet.starts import start_of
 
     champion = champion_of(results, model)
     trained, _ = read_model(champion.model_files[0])
-    parts: dict[str, np.ndarray] = {}
-    with torch.no_grad():
-        summed, _ = trained.observer()
-        if isinstance(trained, SceneNet):
-            parts = dict(zip(trained.names, trained.kernels().numpy(), strict=True))
-        elif isinstance(trained, CNN):
-            parts = {f"kernel {i + 1}": k.numpy() for i, k in enumerate(trained.weight)}
-    alt = kernels({**parts, "all together": summed.numpy()}, out)
+    start = start_of(champion, trained)
+    metres = trained.voxel_size if isinstance(trained, SceneNet) and trained.field else None
+    alt = kernels(_slices(trained), out, start and _slices(start.model), metres)
+    before = "" if start is None else f"The rows above are those {start.said}. "
     figures = "As thesis Figures 4.2 to 4.4." if isinstance(trained, SceneNet) else ""
     return alt, (
         f"Slices through the middle of each kernel of {model}, seed {champion.seed} (best on "
-        "validation): from the side above, from the top below. Red adds to the answer where a "
-        f"voxel is occupied, blue takes away. Each kernel has its own scale. {figures}"
+        "validation). Red adds to the answer where a voxel is occupied, blue takes away. Each "
+        f"kernel has its own scale, the same before and after. {before}{figures}"
     ).strip()
 
 
-def draw_parameters(results: Results, model: str, out: Path) -> tuple[str, str]:
-    from scenenet.figures.charts import parameters
-    from scenenet.modelfile import read_model
-    from scenenet.models import SceneNet
+def _slices(model: VoxelModel) -> dict[str, np.ndarray]:
+    """Every kernel of a model (kz, ky, kx), and their sum."""
+    import torch
 
-    models = [read_model(r.model_files[0])[0] for r in results.of_model(model) if r.model_files]
-    of_seeds = [trained.shape_parameters() for trained in models if isinstance(trained, SceneNet)]
-    if not of_seeds:
+    from scenenet.models import CNN, SceneNet
+
+    parts: dict[str, np.ndarray] = {}
+    with torch.no_grad():
+        summed, _ = model.observer()
+        if isinstance(model, SceneNet):
+            parts = dict(zip(model.names, model.kernels().numpy(), strict=True))
+        elif isinstance(model, CNN):
+            parts = {f"kernel {i + 1}": k.numpy() for i, k in enumerate(model.weight)}
+        return {**parts, "all together": summed.numpy()}
+
+
+def draw_parameters(
+    results: Results, model: str, thesis: Thesis | None, out: Path
+) -> tuple[str, str]:
+    from scenenet.figures.numbers import parameters
+    from scenenet.model_tables import numbers_in_metres
+
+    found = numbers_in_metres(results, model)
+    if found is None:
         raise InputError(f"no tuned model called {model}", file=results.folder / "models" / model)
-    values = {name: [numbers[name] for numbers in of_seeds] for name in of_seeds[0]}
-    return parameters(values, out), (
-        f"The trained parameters of {model}: bars are means over {len(of_seeds)} seeds with one "
-        "standard deviation, dots are single seeds. Lengths are in voxels; the last mixing weight "
-        "is one minus the others. As thesis Figure 5.5."
+    starts = {} if found.before.empty else found.before.mean().to_dict()
+    share = None if thesis is None else thesis.value("parameters.lambda_negative_sphere")
+    published = {} if share is None else {"lambda.negative_sphere": share / 100}
+    alt = parameters(
+        {name: found.after[name].tolist() for name in found.after},
+        out,
+        {parameter.name: parameter.unit for parameter in found.parameters},
+        starts,
+        {name: value for name, value in published.items() if name in found.after},
+    )
+    hollow = f"; hollow circles are the means {found.began}" if starts else ""
+    return alt, (
+        f"The trained parameters of {model}: bars are means over {len(found.after)} seeds with one "
+        f"standard deviation, dots are single seeds{hollow}. Lengths are in metres: kernels in "
+        "voxels times the edge of the voxels they were trained on. The last mixing weight is one "
+        "minus the others; the diamond is the thesis'. As thesis Figure 5.5."
     )
 
 

@@ -87,7 +87,7 @@ def plan(
         draw = _bind(data_drawings.draw_surveys, results)
         planned.append(Drawing("surveys", "A crop of each survey, at one scale", "data", draw))
     models = tuple(results.models)
-    reference = _reference(results)
+    reference = results.predicting
     if reference is not None:
         draw = _bind(data_drawings.draw_grids, results, reference)
         planned.append(Drawing("voxels", "One crop on three grids", "voxels", draw))
@@ -102,7 +102,7 @@ def plan(
         title = f"The kernels of {model}"
         planned.append(Drawing(f"kernels-{model}", title, "learned", draw, shown))
         if kind == "scenenet":
-            draw = _bind(model_drawings.draw_parameters, results, model)
+            draw = _bind(model_drawings.draw_parameters, results, model, thesis)
             title = f"What {model} has learned"
             planned.append(Drawing(f"parameters-{model}", title, "learned", draw, shown))
             draw = _bind(model_drawings.draw_paths, results, model)
@@ -113,6 +113,9 @@ def plan(
             draw = _bind(crop_drawings.draw_crop, results, reference, rank)
             title = f"The {rank} test crop"
             planned.append(Drawing(f"crop-{rank}", title, "crops", draw, models))
+        draw = _bind(crop_drawings.draw_resolutions, results, reference)
+        title = "One crop on two grids, answered by one model"
+        planned.append(Drawing("resolutions", title, "crops", draw, (reference,)))
     for survey in results.predicted:
         draw = _bind(crop_drawings.draw_prediction, results, survey)
         name = f"prediction-{survey}"
@@ -165,9 +168,3 @@ def read_pictures(folder: str | Path, names: Iterable[str]) -> list[Picture]:
 
 def _bind(draw: Callable[..., tuple[str, str]], *known: Any) -> Callable[[Path], tuple[str, str]]:
     return lambda out: draw(*known, out)
-
-
-def _reference(results: Results) -> str | None:
-    """The model by whose scores crops are chosen: the first SCENE-Net, else the first model."""
-    scenenets = [model for model, kind in results.models.items() if kind == "scenenet"]
-    return next(iter([*scenenets, *results.models]), None)

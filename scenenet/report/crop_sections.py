@@ -3,19 +3,36 @@
 from __future__ import annotations
 
 from scenenet.figures import CROP_RANKS
-from scenenet.report.blocks import Block, Scene, Section, Text
-from scenenet.report.material import Material
+from scenenet.report.blocks import Block, Column, Scene, Section, Text, table
+from scenenet.report.material import VOXEL_SCORES, Material, beside
+
+FINER_STUDY = "resolution-after-training"
 
 
 def crops(material: Material) -> Section | None:
-    """Figures 5.8 and 5.9."""
-    blocks = [*_scenes(material), *material.figures("crops")]
+    """Figures 5.8 to 5.10."""
+    blocks = [*_scenes(material), *material.figures("crops"), *_finer(material)]
     if not blocks:
         return None
     said = Text(
         "Three test crops chosen by rule: the one with the highest, the middle and the lowest F0.5."
     )
     return Section("crops", "Right and wrong", [said, *blocks])
+
+
+def _finer(material: Material) -> list[Block]:
+    """What a finer grid after training does to the scores (thesis 5.2.7)."""
+    frame = material.table(f"study-{FINER_STUDY}")
+    studied = [study for study in material.results.studies if study.name == FINER_STUDY]
+    if frame is None or not studied:
+        return []
+    columns = [Column("variant", "grid"), *beside(VOXEL_SCORES)]
+    caption = (
+        f"The same over all {studied[0].part} crops: models trained at one resolution and scored "
+        f"at others, mean ± standard deviation over {len(studied[0].seeds)} seeds (study "
+        f"“{studied[0].title}”, thesis {studied[0].place})."
+    )
+    return [table(frame, columns, caption, f"tables/study-{FINER_STUDY}.csv")]
 
 
 def _scenes(material: Material) -> list[Block]:

@@ -11,9 +11,11 @@ import pandas as pd
 import pytest
 import torch
 
+from scenenet.certificates import certificate
 from scenenet.figures import draw_all, plan
 from scenenet.modelfile import ModelCard, write_model
-from scenenet.models import CNN, SceneNet
+from scenenet.models import SceneNet, new_model
+from scenenet.protocol import ModelSettings, TrainingSettings
 from scenenet.published import Thesis, read_thesis
 from scenenet.report import write_report
 from scenenet.results import Results
@@ -21,6 +23,8 @@ from scenenet.store import create
 from scenenet.tables import write_tables
 
 EPOCHS = 4
+GROWTH = 0.9
+"""What training multiplies every number of these models by."""
 CROPS = ("north-0001", "north-0002", "north-0003")
 DEAD = {("cnn", 1)}
 """Trainings that detect nothing."""
@@ -31,6 +35,11 @@ ORIGIN = np.array([512_000.0, 4_630_000.0, 100.0])
 @pytest.fixture(scope="session")
 def thesis(project_root: Path) -> Thesis:
     return read_thesis(project_root / "config" / "thesis.yaml")
+
+
+@pytest.fixture
+def growth() -> float:
+    return GROWTH
 
 
 @pytest.fixture
@@ -47,6 +56,7 @@ def results(tmp_path: Path) -> Results:
     for model in made.models:
         for seed in made.seeds:
             _write_training(made.folder, model, seed)
+        _write_facts(made.folder, model)
     _write_prediction(made.folder / "predict" / "fresh")
     return made
 
@@ -138,7 +148,6 @@ def _write_training(folder: Path, model: str, seed: int) -> None:
         folder / "tune" / model / f"seed-{seed}.json",
         {"tau": 0.3, "validation": scores | shared, "curve": curve},
     )
-    torch.manual_seed(seed)
     card = ModelCard(
         name=model,
         codes="edp",
@@ -149,10 +158,14 @@ def _write_training(folder: Path, model: str, seed: int) -> None:
         tau=0.3,
         provenance={"seed": seed},
     )
-    network = SceneNet() if model == "scenenet" else CNN()
+    settings = ModelSettings(name=model, kind=model, training=TrainingSettings(epochs=EPOCHS))
+    network = new_model(settings, seed)
+    with torch.no_grad():
+        for parameter in network.parameters():
+            parameter.mul_(GROWTH)
     suffix = ".json" if model == "scenenet" else ".safetensors"
     write_model(folder / "models" / model / f"seed-{seed}{suffix}", network, card)
-    parameters = network.shape_parameters() if model == "scenenet" else {}
+    parameters = network.shape_parameters() if isinstance(network, SceneNet) else {}
     history = [
         {"epoch": e, "loss": 1 / e, "fidelity": 0.9 / e, "penalty": 0.1 / e,
          "validation_loss": 1.1 / e, "seconds": 2.0, **{n: v * e for n, v in parameters.items()}}
@@ -160,10 +173,20 @@ def _write_training(folder: Path, model: str, seed: int) -> None:
     ]  # fmt: skip
     training = folder / "train" / model / f"seed-{seed}"
     write_csv(training / "history.csv", history)
+    write_json(training / "resources.json", {"peak_memory_mb": 500.0 + seed})
     write_json(training / "provenance.json", {
-        "stage": "train", "settings": {"epochs": EPOCHS, "loss": {"alpha": 5.0}}, "seed": seed,
+        "stage": "train", "settings": settings.model_dump(mode="json"), "seed": seed,
         "inputs": {"split": "sha256:abc"}, "code": "c0de", "config": "c0f19", "version": "0.1.0",
     })  # fmt: skip
+
+
+def _write_facts(folder: Path, model: str) -> None:
+    """What was worked out and timed for the model that predicts."""
+    (file,) = (folder / "models" / model).glob("seed-0.*")
+    write_json(folder / "certificates" / f"{model}.json", certificate(file))
+    took = {"64": 8.0, "128": 50.0} if model == "scenenet" else {"64": 12.0}
+    times = {"model": model, "seed": 0, "crops": 3, "inference_ms": took}
+    write_json(folder / "times" / f"{model}.json", times)
 
 
 def _write_prediction(folder: Path) -> None:

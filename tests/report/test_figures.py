@@ -11,7 +11,7 @@ import pytest
 from matplotlib.image import imread
 
 from scenenet.errors import InputError
-from scenenet.figures import charts, draw_all, plan, read_pictures, scenes
+from scenenet.figures import charts, draw_all, numbers, plan, read_pictures, scenes
 from scenenet.pointcloud import PointCloud, class_scheme, write_las
 from scenenet.published import Thesis
 from scenenet.results import Results
@@ -30,7 +30,7 @@ def test_the_plan_names_every_picture_before_anything_has_run(tmp_path: Path):
     assert names == [
         "clusters-north", "voxels", "precision-recall",
         "training-scenenet", "kernels-scenenet", "parameters-scenenet", "paths-scenenet",
-        "training-cnn", "kernels-cnn", "crop-best", "crop-median", "crop-worst",
+        "training-cnn", "kernels-cnn", "crop-best", "crop-median", "crop-worst", "resolutions",
         "prediction-fresh",
     ]  # fmt: skip
 
@@ -117,9 +117,9 @@ def test_training_curves_say_where_they_start_and_end(tmp_path: Path):
 
 def test_kernels_and_parameters_of_any_number_can_be_drawn(tmp_path: Path):
     weights = {"one": np.zeros((9, 5, 5)), "two": np.ones((4, 6, 6))}
-    charts.kernels(weights, tmp_path / "kernels.png")
-    charts.parameters({"cylinder.r": [1.0]}, tmp_path / "one.png")
-    charts.parameters({"lambda.arrow": [0.2, 0.4], "arrow.r": [1, 2]}, tmp_path / "two.png")
+    numbers.kernels(weights, tmp_path / "kernels.png")
+    numbers.parameters({"cylinder.r": [1.0]}, tmp_path / "one.png")
+    numbers.parameters({"lambda.arrow": [0.2, 0.4], "arrow.r": [1, 2]}, tmp_path / "two.png")
     for name in ("kernels", "one", "two"):
         assert inked(tmp_path / f"{name}.png") > 0.01
 

@@ -12,6 +12,7 @@ import pytest
 
 from scenenet import tables
 from scenenet.errors import InputError
+from scenenet.modelfile import read_model
 from scenenet.published import Thesis, read_thesis
 from scenenet.results import Results
 
@@ -111,6 +112,69 @@ def test_training_time_is_the_sum_of_the_epochs(results: Results, thesis: Thesis
     found = row(tables.times(results, thesis), model="scenenet")
     assert (found["training_seconds"], found["seconds_per_epoch"]) == (8, 2)
     assert found["thesis_training_seconds"] == 85 * 60
+
+
+def test_time_until_a_useful_model_counts_the_dead_ones(results: Results, thesis: Thesis):
+    found = row(tables.times(results, thesis), model="cnn")
+    assert (found["live_share"], found["useful_seconds"]) == (0.5, 16)
+    assert (found["thesis_useful_seconds"], found["thesis_inference_ms"]) == (8 * 3600, 43)
+
+
+def test_inference_and_memory_are_as_measured(results: Results, thesis: Thesis):
+    found = tables.times(results, thesis)
+    scenenet, cnn = row(found, model="scenenet"), row(found, model="cnn")
+    assert (scenenet["inference_ms"], scenenet["inference_ms_128"]) == (8, 50)
+    assert (cnn["inference_ms"], scenenet["peak_memory_mb"]) == (12, 501)
+    assert math.isnan(cnn["inference_ms_128"])
+
+
+def test_the_black_box_is_timed_beside_the_models(results: Results, thesis: Thesis):
+    folder = results.folder / "black_box"
+    folder.mkdir()
+    evaluation = (results.folder / "evaluate" / "scenenet" / "seed-0.json").read_text()
+    for seed in results.seeds:
+        (folder / f"seed-{seed}.json").write_text(evaluation)
+    times = {"training_seconds": [3, 5], "inference_ms": {"64": 30}, "peak_memory_mb": 900}
+    (folder / "times.json").write_text(json.dumps(times))
+    found = row(tables.times(results, thesis), model="black box")
+    assert (found["training_seconds"], found["useful_seconds"]) == (4, 4)
+    assert (found["inference_ms"], found["peak_memory_mb"]) == (30, 900)
+
+
+def test_numbers_are_in_metres_with_their_start_and_the_thesis_beside(
+    results: Results, thesis: Thesis, growth: float
+):
+    found = tables.parameters(results, thesis)
+    assert len(found) == 12
+    assert set(found["model"]) == {"scenenet"}
+    drawn = [read_model(r.model_files[0])[0].shape_parameters() for r in results.trained
+             if r.kind == "scenenet"]  # fmt: skip
+    for name, factor, unit in (("cylinder.r", 1.3, "m"), ("arrow.sigma", 1.3**2, "m^2"),
+                               ("negative_sphere.omega", 1, "1")):  # fmt: skip
+        values = [factor * numbers[name] for numbers in drawn]
+        entry = row(found, parameter=name)
+        assert entry["mean"] == pytest.approx(sum(values) / 2)
+        assert entry["std"] == pytest.approx(abs(values[0] - values[1]) / math.sqrt(2))
+        assert entry["initial"] == pytest.approx(entry["mean"] / growth, rel=1e-4)
+        assert entry["unit"] == unit
+        assert len(entry["sentence"]) > 20
+    share = row(found, parameter="lambda.negative_sphere")
+    assert share["thesis"] == pytest.approx(0.7634)
+    weights = found[found["symbol"] == "λ"]
+    assert weights["mean"].sum() == pytest.approx(1, abs=1e-5)
+
+
+def test_what_is_certain_of_each_model_stands_in_rows(results: Results, thesis: Thesis):
+    found = tables.certificate(results, thesis)
+    counts = found["model"].value_counts()
+    assert (counts["scenenet"], counts["cnn"]) == (8, 2)
+    convex = row(found, model="scenenet", property="convex combination of GENEOs")
+    assert convex["value"] == pytest.approx(1, abs=1e-5)
+    assert "cylinder" in convex["found"]
+    moved = tables.turns(results, thesis)
+    straight = row(moved, model="scenenet", degrees=0)
+    assert straight["mean_h"] == 0
+    assert moved["degrees"].isna().sum() == 2
 
 
 def test_every_table_is_written_and_reads_back(results: Results, thesis: Thesis, tmp_path: Path):

@@ -90,8 +90,8 @@ def test_a_training_is_a_run_with_all_that_is_known_of_it(settings, client, resu
     (run,) = runs(client)["scenenet seed 1"]
     assert run.info.status == "FINISHED"
     assert run.info.end_time - run.info.start_time == 8000
-    assert run.data.params["epochs"] == "4"
-    assert run.data.params["loss.alpha"] == "5.0"
+    assert run.data.params["training.epochs"] == "4"
+    assert run.data.params["training.loss.alpha"] == "5.0"
     assert run.data.metrics["test_precision"] == pytest.approx(0.6)
     assert run.data.metrics["validation_f05"] == pytest.approx(0.3)
     assert run.data.metrics["towers_median_error_m"] == 1.5

@@ -23,7 +23,7 @@ def each_seed_of(model):
     ]
 
 
-def gathered(models=None, surveys=TRAIN, predicted=(), studies=(), contests=()):
+def gathered(models=None, surveys=TRAIN, predicted=(), studies=(), contests=(), predicts=None):
     """The arguments of ``scenenet.results.Results``. Models are pairs, because their order counts
     and that of a dict does not survive in a parameter."""
     chosen = settings.models if models is None else models
@@ -35,6 +35,7 @@ def gathered(models=None, surveys=TRAIN, predicted=(), studies=(), contests=()):
         "predicted": list(predicted),
         "studies": [settings.study_named(study).model_dump(mode="json") for study in studies],
         "contests": list(contests),
+        "predicts": predicts,
     }
 
 
@@ -78,11 +79,15 @@ TRAININGS = [
     *each_training(f"{R}/train/{{model}}/seed-{{seed}}/history.csv"),
     *each_training(f"{R}/train/{{model}}/seed-{{seed}}/provenance.json"),
 ]
+RESOURCES = each_training(f"{R}/train/{{model}}/seed-{{seed}}/resources.json")
 TUNINGS = [
     *each_training(f"{R}/tune/{{model}}/seed-{{seed}}.json"),
     *(tuned_file(model.name, seed) for model in settings.models for seed in settings.seeds),
 ]
 SCORES = each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.json")
+CERTIFICATES = [f"{R}/certificates/{model.name}.json" for model in settings.models]
+TIMES = [f"{R}/times/{model.name}.json" for model in settings.models]
+BLACK_BOX_TIMES = f"{R}/black_box/times.json"
 BLACK_BOX = expand(f"{R}/black_box/seed-{{seed}}.json", seed=settings.seeds)
 SCENES = expand(f"{R}/scenes/{{rank}}.json", rank=CROP_RANKS)
 STUDIED = [study.name for study in settings.studies]
@@ -121,7 +126,11 @@ RECORDS = [
     *each_training(f"{R}/train/{{model}}/seed-{{seed}}/provenance.json"),
     *each_training(f"{R}/tune/{{model}}/seed-{{seed}}.provenance.json"),
     *each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.provenance.json"),
-    *expand(f"{R}/models/{{model}}.provenance.json", model=[m.name for m in settings.models]),
+    *expand(
+        f"{R}/{{stage}}/{{model}}.provenance.json",
+        stage=["models", "certificates", "times"],
+        model=[m.name for m in settings.models],
+    ),
     *expand(f"{R}/predict/{{survey}}/provenance.json", survey=NEW),
     *expand(f"{R}/studies/{{study}}/provenance.json", study=STUDIED),
     *expand(f"{R}/{{contest}}/provenance.json", contest=CONTESTS),

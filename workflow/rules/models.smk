@@ -13,6 +13,7 @@ rule train:
     output:
         model=f"{R}/train/{{model}}/seed-{{seed}}/model.json",
         history=f"{R}/train/{{model}}/seed-{{seed}}/history.csv",
+        resources=f"{R}/train/{{model}}/seed-{{seed}}/resources.json",
         provenance=f"{R}/train/{{model}}/seed-{{seed}}/provenance.json",
     log:
         f"{R}/logs/train/{{model}}-seed-{{seed}}.log",
@@ -41,6 +42,7 @@ use rule train as train_cnn with:
     output:
         model=f"{R}/train/{{model}}/seed-{{seed}}/model.safetensors",
         history=f"{R}/train/{{model}}/seed-{{seed}}/history.csv",
+        resources=f"{R}/train/{{model}}/seed-{{seed}}/resources.json",
         provenance=f"{R}/train/{{model}}/seed-{{seed}}/provenance.json",
     wildcard_constraints:
         model=any_of(models_of("cnn")),
@@ -121,6 +123,53 @@ use rule champion as champion_cnn with:
         model=any_of(models_of("cnn")),
 
 
+rule certificate:
+    input:
+        model=lambda w: champion_file(w.model),
+    output:
+        certificate=f"{R}/certificates/{{model}}.json",
+        provenance=f"{R}/certificates/{{model}}.provenance.json",
+    log:
+        f"{R}/logs/certificate/{{model}}.log",
+    benchmark:
+        f"{R}/benchmarks/certificate/{{model}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=20,
+    params:
+        job=job("certificate", {}),
+    message:
+        "Working out which promises of a GENEO {wildcards.model} keeps"
+    script:
+        "../scripts/certificate.py"
+
+
+rule timing:
+    input:
+        model=lambda w: champion_file(w.model),
+        stores=CROP_STORES,
+        manifests=CROP_MANIFESTS,
+        split=f"{R}/split/split.csv",
+    output:
+        times=f"{R}/times/{{model}}.json",
+        provenance=f"{R}/times/{{model}}.provenance.json",
+    log:
+        f"{R}/logs/timing/{{model}}.log",
+    benchmark:
+        f"{R}/benchmarks/timing/{{model}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        job=job("timing", {}),
+    message:
+        "Timing {wildcards.model} on test crops"
+    script:
+        "../scripts/timing.py"
+
+
 rule evaluate:
     input:
         model=lambda w: tuned_file(w.model, w.seed),
@@ -153,6 +202,7 @@ rule black_box:
         split=f"{R}/split/split.csv",
     output:
         scores=BLACK_BOX,
+        times=BLACK_BOX_TIMES,
         provenance=f"{R}/black_box/provenance.json",
     log:
         f"{R}/logs/black_box.log",

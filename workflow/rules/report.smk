@@ -26,11 +26,14 @@ rule tables:
         towers=expand(f"{R}/towers/{{survey}}/towers.csv", survey=TRAIN),
         grids=VOXEL_MANIFESTS,
         trainings=TRAININGS,
+        resources=RESOURCES,
         tunings=TUNINGS,
         scores=SCORES,
         studies=STUDIES,
         contests=CONTEST_RUNS,
-        black_box=BLACK_BOX,
+        black_box=[*BLACK_BOX, BLACK_BOX_TIMES],
+        certificates=CERTIFICATES,
+        times=TIMES,
         thesis=ancient(settings.thesis),
     output:
         tables=shown_tables(TABLES),
@@ -75,7 +78,7 @@ rule figures:
         job=job(
             "figures",
             {},
-            results=gathered(),
+            results=gathered(predicts=settings.predict.model),
             pictures=FIGURES,
             sources={},
             input=THESIS,
@@ -217,6 +220,7 @@ rule report:
         pictures=[file for names in pictures(ALL_PICTURES).values() for file in names],
         scores=SCORES,
         tunings=TUNINGS,
+        certificates=CERTIFICATES,
         checks=expand(f"{R}/check/{{survey}}/report.json", survey=CHECKED),
         predictions=expand(
             f"{R}/predict/{{survey}}/{{survey}}.{{part}}",
@@ -240,7 +244,13 @@ rule report:
         job=job(
             "report",
             {},
-            results=gathered(surveys=TRAIN, predicted=NEW, studies=STUDIED, contests=CONTESTS),
+            results=gathered(
+                surveys=TRAIN,
+                predicted=NEW,
+                studies=STUDIED,
+                contests=CONTESTS,
+                predicts=settings.predict.model,
+            ),
             input=THESIS,
         ),
     message:

@@ -13,6 +13,7 @@ def black_box(job: adapter.Job) -> None:
         DetectionSettings(**job.settings),
         job.identity["seeds"],
         job.output.scores,
+        job.output.times,
     )
 
 

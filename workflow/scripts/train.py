@@ -6,6 +6,8 @@ import adapter
 
 
 def train(job: adapter.Job) -> None:
+    from scenenet.files import write_json
+    from scenenet.memory import used
     from scenenet.protocol import ModelSettings
     from scenenet.training import train
     from scenenet.voxels import VoxelSettings
@@ -23,6 +25,7 @@ def train(job: adapter.Job) -> None:
         grid=VoxelSettings(**job.identity["grid"]),
         provenance=job.made_by(),
     )
+    write_json(job.output.resources, used())
 
 
 adapter.run(train)

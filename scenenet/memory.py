@@ -1,0 +1,17 @@
+"""How much memory a process has had."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+
+def used() -> dict[str, Any]:
+    """What this process has used so far: ``peak_memory_mb``, the largest resident set it ever had,
+    libraries included, MB of 10^6 bytes; None on systems that do not say."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return {"peak_memory_mb": None}
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return {"peak_memory_mb": peak * (1 if sys.platform == "darwin" else 1024) / 1e6}

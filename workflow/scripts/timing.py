@@ -1,0 +1,13 @@
+"""Time a model on test crops."""
+
+import adapter
+
+
+def timing(job: adapter.Job) -> None:
+    from scenenet.files import write_json
+    from scenenet.model_times import time_model
+
+    write_json(job.output.times, time_model(job.input.model, job.input.manifests, job.input.split))
+
+
+adapter.run(timing)

@@ -37,7 +37,13 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
 
     from scenenet.batches import batch
     from scenenet.convolution import convolve_at_voxels
-    from scenenet.figures.chosen import champion_of, class_groups, crop_cloud, ranked
+    from scenenet.figures.chosen import (
+        champion_of,
+        class_groups,
+        crop_cloud,
+        ranked,
+        voxel_classes,
+    )
     from scenenet.metrics import THRESHOLDS, ThresholdCurve
     from scenenet.modelfile import read_model
     from scenenet.models import SceneNet
@@ -65,7 +71,8 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
         shares = {name: _coded(row) for name, row in zip(trained.names, percent, strict=True)}
     taus = THRESHOLDS.astype(probability.dtype)
     zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
-    classes = _classes(class_groups(cloud), voxels.grid.voxel_of(cloud.xyz), voxels.index)
+    names = voxel_classes(class_groups(cloud), voxels.grid.voxel_of(cloud.xyz), voxels.index)
+    classes = np.array([CLASSES.index(name) for name in names], np.uint8)
     scene = {
         "crop": sample["id"],
         "rank": rank,
@@ -85,16 +92,6 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
     }
     write_json(out, scene)
     return scene
-
-
-def _classes(groups: np.ndarray, voxel: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """(M,) uint8 class of each occupied voxel: the last of ``CLASSES`` that it holds."""
-    codes = np.zeros(len(groups), np.uint8)
-    for code, name in enumerate(CLASSES):
-        codes[groups == name] = code
-    shown = np.zeros(len(index), np.uint8)
-    np.maximum.at(shown, np.searchsorted(index, voxel), codes)
-    return shown
 
 
 def _coded(array: np.ndarray) -> str:

@@ -16,6 +16,9 @@ from scenenet.results import Results, SeedResult, read_table
 if TYPE_CHECKING:
     from scenenet.pointcloud import PointCloud
 
+CLASSES = ("tower", "wire", "vegetation", "ground", "other")
+"""What a point may be, those that matter most first."""
+
 POINTS_PER_PICTURE = 60_000
 """Enough to look dense at the size the pictures have."""
 
@@ -61,6 +64,22 @@ def class_groups(cloud: PointCloud) -> np.ndarray:
     return groups
 
 
-def thinned(n: int) -> np.ndarray:
-    """Evenly spread positions of at most ``POINTS_PER_PICTURE`` of ``n`` points."""
-    return np.arange(0, n, max(1, -(-n // POINTS_PER_PICTURE)))
+def voxel_classes(groups: np.ndarray, voxel: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """(M,) what each occupied voxel holds: the first of ``CLASSES`` that any of its points is.
+
+    Args:
+        groups: (N,) of ``class_groups``.
+        voxel: (N,) flat voxel of each point.
+        index: (M,) flat occupied voxels, ascending.
+    """
+    codes = np.zeros(len(groups), np.uint8)
+    for code, name in enumerate(reversed(CLASSES)):
+        codes[groups == name] = code
+    shown = np.zeros(len(index), np.uint8)
+    np.maximum.at(shown, np.searchsorted(index, voxel), codes)
+    return np.array(CLASSES)[::-1][shown]
+
+
+def thinned(n: int, most: int = POINTS_PER_PICTURE) -> np.ndarray:
+    """Evenly spread positions of at most ``most`` of ``n`` points."""
+    return np.arange(0, n, max(1, -(-n // most)))

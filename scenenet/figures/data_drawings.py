@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenenet.errors import InputError
-from scenenet.figures.chosen import champion_of, crop_cloud, ranked, thinned
+from scenenet.figures.chosen import (
+    POINTS_PER_PICTURE,
+    champion_of,
+    class_groups,
+    crop_cloud,
+    ranked,
+    thinned,
+    voxel_classes,
+)
 from scenenet.results import Results, read_result
 
 if TYPE_CHECKING:
@@ -41,6 +49,31 @@ def draw_clusters(
     )
 
 
+def draw_labels(survey: str, path: str, codes: str, out: Path) -> tuple[str, str]:
+    """A whole survey coloured by its labels (thesis Figure 5.1)."""
+    from scenenet.figures.scenes import labelled_survey
+    from scenenet.pointcloud import iter_chunks, survey_info
+
+    step = max(1, -(-survey_info(path).n_points // POINTS_PER_PICTURE))
+    places, names = [np.empty((0, 3))], [np.empty(0, "U10")]
+    start = 0
+    for chunk in iter_chunks(path, codes):
+        groups = class_groups(chunk)
+        keep = np.isin(groups, ("tower", "wire"))
+        # Every n-th of the others, counted over the survey and not over its chunks.
+        keep[(-start) % step :: step] = True
+        start += len(groups)
+        places.append(chunk.xyz[keep])
+        names.append(groups[keep])
+    xyz, found = np.concatenate(places), np.concatenate(names)
+    kept = thinned(len(xyz), 3 * POINTS_PER_PICTURE)
+    return labelled_survey(xyz[kept], found[kept], out), (
+        f"{survey} from above and from the side, along its main direction, coloured by its labels; "
+        "the points are thinned, those of towers and wires less than the others. As thesis Figure "
+        "5.1."
+    )
+
+
 def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
     """The crop with the median number of points of each survey; of recorded samples more."""
     from scenenet.figures.beside import crops_beside, kinds_of
@@ -65,7 +98,7 @@ def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
     return crops_beside(shown, out), (
         "Crops from the side and from above, all at the same scale: of a synthetic survey the one "
         "with the median number of points, of recorded ones three. Points are coloured by what "
-        "they were labelled."
+        "they were labelled. As thesis Figure 5.3."
     )
 
 
@@ -75,14 +108,16 @@ def draw_grids(results: Results, reference: str, out: Path) -> tuple[str, str]:
 
     sample = ranked(champion_of(results, reference), "best")
     cloud = crop_cloud(results, sample)
+    groups = class_groups(cloud)
     grids = {}
     for resolution in GRID_RESOLUTIONS:
         voxels = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution))
         zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
-        grids[f"{resolution}³, voxels of {voxels.grid.voxel_size:.2f} m"] = (zyx, voxels.tower)
+        names = voxel_classes(groups, voxels.grid.voxel_of(cloud.xyz), voxels.index)
+        grids[f"{resolution}³, voxels of {voxels.grid.voxel_size:.2f} m"] = (zyx, names)
     return voxel_grids(grids, out), (
-        f"Occupied voxels of crop {sample['id']} at three resolutions, those with a point labelled "
-        "tower in red. As thesis Figure 5.4."
+        f"Occupied voxels of crop {sample['id']} at three resolutions, coloured by what they hold: "
+        "a tower, else a wire, vegetation, ground, or something else. As thesis Figure 5.4."
     )
 
 

@@ -81,6 +81,9 @@ def plan(
     for survey, (path, codes) in (sources or {}).items():
         if Path(path).suffix.lower() in (".las", ".laz"):
             draw = _bind(data_drawings.draw_clusters, results, survey, path, codes)
+            labels = _bind(data_drawings.draw_labels, survey, path, codes)
+            title = f"{survey}, coloured by its labels"
+            planned.append(Drawing(f"labels-{survey}", title, "data", labels, survey=survey))
             title = f"Towers of {survey} told apart"
             planned.append(Drawing(f"clusters-{survey}", title, "towers", draw, survey=survey))
     if results.surveys:

@@ -112,31 +112,42 @@ def voxel_grids(grids: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | P
     """Occupied voxels of one crop at several resolutions (thesis Figure 5.4).
 
     Args:
-        grids: title -> ((M, 3) integer z, y, x of the occupied voxels, (M,) bool tower).
+        grids: title -> ((M, 3) integer z, y, x of the occupied voxels, (M,) names of
+            ``CLASS_COLOURS``).
         out: PNG to write.
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(3.4 * len(grids), 4.6), layout="constrained")
-    for place, (title, (zyx, tower)) in enumerate(grids.items(), start=1):
+    for place, (title, (zyx, names)) in enumerate(grids.items(), start=1):
         axis = figure.add_subplot(1, len(grids), place, projection="3d")
         z, y, x = zyx.T
         longest = max(1, int(np.ptp(zyx, axis=0).max()) + 1)
         size = (190 / longest) ** 2
-        axis.scatter(x[~tower], y[~tower], z[~tower], c=z[~tower], cmap="Greys_r", s=size,
-                     marker="s", lw=0, vmax=1.3 * max(1, z.max()), alpha=0.8)  # fmt: skip
-        axis.scatter(x[tower], y[tower], z[tower], c=TOWER_COLOUR, s=size, marker="s", lw=0)
+        for name in reversed(list(CLASS_COLOURS)):
+            member = names == name
+            # One by one, so that what stands in front of a tower does not hide it.
+            axis.scatter(x[member], y[member], z[member], c=CLASS_COLOURS[name], s=size, marker="s",
+                         lw=0, alpha=1 if name in ("tower", "wire") else 0.6)  # fmt: skip
         axis.set_title(title, y=0.98, fontsize=11)
         for side in (axis.xaxis, axis.yaxis, axis.zaxis):
             side.set_ticklabels([])
         axis.set_box_aspect([max(1, np.ptp(values)) for values in (x, y, z)], zoom=1.05)
         axis.view_init(elev=18, azim=-60)
+    shown = {name for _, names in grids.values() for name in names}
+    handles = [
+        figure.axes[0].plot([], [], [], "s", c=colour, ms=7, label=name)[0]
+        for name, colour in CLASS_COLOURS.items()
+        if name in shown
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False,
+                  fontsize=9)  # fmt: skip
     save(figure, out)
     counts = "; ".join(
-        f"{title}: {len(zyx)} occupied, {int(tower.sum())} tower"
-        for title, (zyx, tower) in grids.items()
+        f"{title}: {len(zyx)} occupied, {int((names == 'tower').sum())} tower"
+        for title, (zyx, names) in grids.items()
     )
-    return f"Occupied voxels of a crop in perspective, tower voxels red. {counts}."
+    return f"Occupied voxels of a crop in perspective, coloured by class. {counts}."
 
 
 def survey_overview(
@@ -176,6 +187,33 @@ def survey_overview(
         f"The survey from above and from the side over {np.ptp(along):.0f} m, coloured by tower "
         f"probability; {len(towers)} detected towers are marked."
     )
+
+
+def labelled_survey(xyz: np.ndarray, names: np.ndarray, out: str | Path) -> str:
+    """A labelled survey along its line, from above and from the side (thesis Figure 5.1).
+
+    Args:
+        xyz: (N, 3) m, thinned for drawing.
+        names: (N,) of ``CLASS_COLOURS``.
+        out: PNG to write.
+    """
+    along, across = ((xyz[:, :2] - xyz[:, :2].mean(axis=0)) @ principal_axes(xyz[:, :2])).T
+    along -= along.min()
+    figure, axes = new_figure(2, 1, width=9.5, height=5, sharex=True)
+    top, side = axes[:, 0]
+    _scatter_classes(top, along, across, names)
+    _scatter_classes(side, along, xyz[:, 2], names)
+    top.set(ylabel="across the line [m]")
+    side.set(xlabel="along the line [m]", ylabel="elevation [m]")
+    handles, labels = side.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(CLASS_COLOURS),
+                  frameon=False, markerscale=4, fontsize=9)  # fmt: skip
+    save(figure, out)
+    shares = ", ".join(
+        f"{name} {100 * (names == name).mean():.1f} %" for name in CLASS_COLOURS
+        if (names == name).any()
+    )  # fmt: skip
+    return f"The survey from above and from the side over {np.ptp(along):.0f} m. Drawn: {shares}."
 
 
 def principal_axes(xy: np.ndarray) -> np.ndarray:

@@ -33,6 +33,8 @@ def data(material: Material) -> Section | None:
             "shares agree only as far as the surveys are alike."
         )
         blocks.append(table(classes, columns, caption, "tables/classes.csv"))
+    for survey in material.results.surveys:
+        blocks += material.figures_of(survey, "data")
     blocks += material.figures("data")
     return Section("data", "The surveys", blocks) if blocks else None
 

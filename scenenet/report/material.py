@@ -31,7 +31,8 @@ class Material:
     @cached_property
     def pictures(self) -> list[Picture]:
         names = [drawing.name for drawing in plan(self.results)]
-        maps = [f"clusters-{survey}" for survey in self.results.surveys]
+        surveys = self.results.surveys
+        maps = [f"{kind}-{survey}" for kind in ("labels", "clusters") for survey in surveys]
         return read_pictures(self.results.folder / "figures", [*maps, *names])
 
     def figures(self, section: str) -> list[Block]:

@@ -73,8 +73,8 @@ def _compared(material: Material, other: Mapping[Any, Any], first: Mapping[Any, 
     else:
         beside = f"{abs(apart):.2f} {'better' if apart > 0 else 'worse'} than {first['model']}"
     return (
-        f"{who} reaches a precision of {other['precision']:.2f} at a recall of {other['recall']:.2f}; with an F0.5 of "
-        f"{other['f05']:.2f} it is {beside}."
+        f"{who} reaches a precision of {other['precision']:.2f} at a recall of "
+        f"{other['recall']:.2f}; with an F0.5 of {other['f05']:.2f} it is {beside}."
     )
 
 

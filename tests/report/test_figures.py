@@ -11,7 +11,8 @@ import pytest
 from matplotlib.image import imread
 
 from scenenet.errors import InputError
-from scenenet.figures import charts, draw_all, numbers, plan, read_pictures, scenes
+from scenenet.figures import charts, draw_all, grids, numbers, plan, read_pictures, scenes
+from scenenet.figures.chosen import voxel_classes
 from scenenet.pointcloud import PointCloud, class_scheme, write_las
 from scenenet.published import Thesis
 from scenenet.results import Results
@@ -28,7 +29,7 @@ def test_the_plan_names_every_picture_before_anything_has_run(tmp_path: Path):
     )
     names = [drawing.name for drawing in plan(empty, sources={"north": ("north.laz", "edp")})]
     assert names == [
-        "clusters-north", "voxels", "precision-recall",
+        "labels-north", "clusters-north", "voxels", "precision-recall",
         "training-scenenet", "kernels-scenenet", "parameters-scenenet", "paths-scenenet",
         "training-cnn", "kernels-cnn", "crop-best", "crop-median", "crop-worst", "resolutions",
         "prediction-fresh",
@@ -90,7 +91,8 @@ def test_the_map_of_towers_counts_them_and_the_noise(results: Results, tmp_path:
     write_las(tmp_path / "north.laz", PointCloud(xyz, codes, class_scheme("edp")))
     sources = {"north": (str(tmp_path / "north.laz"), "edp")}
     planned = plan(replace(results, models={}, predicted=[], surveys=[]), sources=sources)
-    (picture,) = draw_all(planned, tmp_path)
+    labels, picture = draw_all(planned, tmp_path)
+    assert "Drawn: tower 100.0 %" in labels.alt
     assert "805 points labelled tower in 2 clusters" in picture.alt
     assert "5 points belong to none" in picture.alt
 
@@ -130,3 +132,60 @@ def test_a_survey_is_turned_so_that_its_line_lies_flat(tmp_path: Path):
     alt = scenes.survey_overview(xyz, np.zeros(2000), np.zeros((0, 3)), tmp_path / "survey.png")
     assert "over 1000 m" in alt
     assert "0 detected towers" in alt
+
+
+def test_a_voxel_has_the_colour_of_what_matters_most_in_it():
+    groups = np.array(["ground", "tower", "ground", "vegetation", "wire", "other"])
+    voxel = np.array([7, 7, 3, 3, 9, 12])
+    found = voxel_classes(groups, voxel, np.array([3, 7, 9, 12]))
+    assert list(found) == ["vegetation", "tower", "wire", "other"]
+
+
+def test_axes_of_kernels_in_metres_reach_as_far_as_the_kernel(tmp_path: Path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(numbers, "save", lambda figure, out: drawn.append(figure))
+    kernel = np.zeros((5, 3, 3))
+    kernel[:, 1, 1] = 1
+    numbers.kernels({"one": kernel}, tmp_path / "k.png", {"one": kernel / 2}, metres=0.5)
+    (figure,) = drawn
+    images = [axis.images[0] for axis in figure.axes if axis.images]
+    assert [tuple(image.get_extent()) for image in images] == 2 * [
+        (-0.75, 0.75, -1.25, 1.25),
+        (-0.75, 0.75, -0.75, 0.75),
+    ]
+    # The same colours before and after.
+    assert {image.get_clim() for image in images} == {(-1.0, 1.0)}
+    assert figure.axes[0].get_xlabel() == "x [m]"
+
+
+def test_an_even_kernel_reaches_further_up_than_down(tmp_path: Path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(numbers, "save", lambda figure, out: drawn.append(figure))
+    numbers.kernels({"one": np.ones((4, 3, 3))}, tmp_path / "k.png")
+    side = drawn[0].axes[0].images[0]
+    assert tuple(side.get_extent()) == (-1.5, 1.5, -1.5, 2.5)
+
+
+def test_the_start_of_a_number_and_the_thesis_stand_beside_it(tmp_path: Path):
+    alt = numbers.parameters(
+        {"cylinder.r": [0.5, 0.7], "lambda.negative_sphere": [0.2, 0.4]},
+        tmp_path / "p.png",
+        {"cylinder.r": "m"},
+        {"cylinder.r": 1.25},
+        {"lambda.negative_sphere": 0.7634},
+    )
+    assert "cylinder.r 0.6 (began at 1.25)" in alt
+    assert inked(tmp_path / "p.png") > 0.01
+
+
+def test_a_crop_on_two_grids_counts_what_is_labelled_and_what_is_answered(tmp_path: Path):
+    rng = np.random.default_rng(0)
+    views = []
+    for size, n in ((1.0, 50), (0.5, 200)):
+        centres = rng.uniform(0, 20, (n, 3))
+        tower = np.arange(n) < n // 10
+        views.append(grids.GridView(f"{size} m", centres, size, tower, np.linspace(1, 0, n)))
+    alt = grids.truth_and_answer(views, 0.9, tmp_path / "g.png")
+    assert "1.0 m: 5 of 50 voxels labelled tower, 5 answered so" in alt
+    assert "0.5 m: 20 of 200 voxels labelled tower, 20 answered so" in alt
+    assert inked(tmp_path / "g.png") > 0.01

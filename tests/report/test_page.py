@@ -86,6 +86,45 @@ def test_our_scores_stand_beside_those_of_the_thesis(page: Path):
     assert "nothing detected" in text
 
 
+def test_the_opening_is_about_the_model_that_predicts(page: Path, results: Results, thesis: Thesis):
+    write_report(replace(results, predicts="cnn"), thesis, page)
+    html = page.read_text(encoding="utf-8")
+    opening = html[html.index('id="overview"') :].partition("</section>")[0]
+    assert re.search(
+        r"cnn \(seed 0, best on validation\)[^.]* is the model that\s+predicts", opening
+    )
+    # Precision 0.4 and 0.8, F0.5 half of that.
+    assert "reaches a precision of 0.80 at a recall of 0.20" in opening
+    assert "with an F0.5 of 0.40 it is 0.20 better than cnn" in opening
+    write_report(results, thesis, page)
+    html = page.read_text(encoding="utf-8")
+    assert "with an F0.5 of 0.20 it is 0.20 worse than scenenet" in html
+
+
+def test_a_model_that_finds_nothing_is_said_to_find_nothing(
+    results: Results, thesis: Thesis, tmp_path: Path
+):
+    dead = replace(results, seeds=[1])
+    write_tables(dead, thesis, results.folder / "tables")
+    write_report(dead, thesis, tmp_path / "index.html")
+    assert "finds no voxel of a tower" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_numbers_are_read_out_and_what_is_certain_is_said(page: Path):
+    found = read(page)
+    assert {"learned", "certificate"} <= {section["id"] for section in found.all("section")}
+    for said in (
+        "speaks most for a tower",
+        "76.34 %",
+        "scenenet: 6 of 8 hold",
+        "convex combination of GENEOs",
+        "cnn is a convolution",
+    ):
+        assert said in found.text
+    for said in ("8 ms", "12 ms"):
+        assert said.split()[0] in found.text
+
+
 def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: Thesis):
     study = StudySettings(
         name="ablations", title="Which operators?", place="Table 5.5", asks="What does it need?",

@@ -17,6 +17,8 @@ SCORED = {
     "tune_cnn": 2,
     "champion": 1,
     "champion_cnn": 1,
+    "certificate": 2,
+    "timing": 2,
     "evaluate": 4,
     "tables": 1,
     "figures": 1,
@@ -57,7 +59,8 @@ def test_a_file_put_into_the_inbox_runs_its_own_jobs_and_the_report(project):
 def test_a_survey_to_train_on_makes_a_larger_dataset_and_reads_no_other_survey_again(project):
     shutil.copy(project.folder / "data/own.laz", project.folder / "data/another.laz")
     project.add_row("another", "data/another.laz", "edp", "train")
-    own = {"check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1}
+    own = {"check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1,
+           "survey_map": 1}  # fmt: skip
     assert project.planned() == {**own, "split": 1, **LEARNED}
 
 
@@ -94,7 +97,8 @@ def test_taking_a_survey_out_of_the_sheet_only_writes_the_report_again(project):
 
 def test_another_recipe_makes_one_synthetic_survey_anew(project):
     project.edit("config/config.yaml", "seed: 2", "seed: 22")
-    own = {"synthesize": 1, "check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1}
+    own = {"synthesize": 1, "check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1,
+           "survey_map": 1}  # fmt: skip
     assert project.planned() == {**SETTINGS, **own, "split": 1, **LEARNED}
 
 
@@ -131,7 +135,8 @@ def test_another_resolution_keeps_the_grids_there_are(project):
 
 def test_predicting_with_another_model_trains_nothing(project):
     project.configure({"predict.model": "cnn"})
-    assert project.planned() == {**SETTINGS, **PREDICTED, "scene": 3}
+    shown = {"figures": 1, "track": 1, "register": 1, "scene": 3}
+    assert project.planned() == {**SETTINGS, **PREDICTED, **shown}
 
 
 def test_one_more_seed_trains_only_that_seed(project):
@@ -142,7 +147,7 @@ def test_one_more_seed_trains_only_that_seed(project):
 
 def test_one_seed_less_trains_nothing(project):
     project.configure({"seeds": [0]})
-    gathered = {"champion": 1, "champion_cnn": 1, "tables": 1, "figures": 1, "track": 1,
+    gathered = {"champion": 1, "champion_cnn": 1, "certificate": 2, "timing": 2, "tables": 1, "figures": 1, "track": 1,
                 "register": 1, "scene": 3}  # fmt: skip
     assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BLACK_BOX}
 
@@ -151,7 +156,7 @@ def test_one_more_model_leaves_the_others_alone(project):
     kernel = {"name": "tall", "kind": "scenenet", "kernel_size": [15, 5, 5]}
     models = [{"name": n, "kind": n} for n in ("scenenet", "cnn")]
     project.configure({"models": [*models, kernel]})
-    own = {"train": 2, "tune": 2, "evaluate": 2, "champion": 1}
+    own = {"train": 2, "tune": 2, "evaluate": 2, "champion": 1, "certificate": 1, "timing": 1}
     gathered = {"tables": 1, "figures": 1, "track": 1, "register": 1, "report": 1}
     assert project.planned() == {**SETTINGS, **own, **gathered}
 
@@ -193,7 +198,7 @@ def test_a_new_kernel_trains_again(project):
     """All figures are drawn by one script, which knows the kernels."""
     kernels = project.folder / "scenenet/geneo/kernels"
     (kernels / "cone.py").write_text("# to come\nNOTHING = 0\n")
-    assert project.planned() == {**LEARNED, "tower_map": 2}
+    assert project.planned() == {**LEARNED, "tower_map": 2, "survey_map": 2}
 
 
 def test_editing_the_report_writes_the_report_again(project):

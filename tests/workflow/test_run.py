@@ -18,6 +18,7 @@ pytestmark = pytest.mark.workflow
 STAGES = {
     *("synthesize", "check", "towers", "crops", "voxels", "split"),
     *("train", "tune", "champion", "evaluate", "predict"),
+    *("certificate", "timing"),
     *("study", "black_box", "tables", "figures", "scene"),
     *("track", "track_studies", "register", "report"),
 }

@@ -3,9 +3,12 @@ holds the thesis' numbers where there are any."""
 
 from __future__ import annotations
 
+import re
+
 import pandas as pd
 import pytest
 import yaml
+from markupsafe import escape
 
 from scenenet.files import read_json
 
@@ -16,13 +19,18 @@ TABLES = {
     "5.1.2": ("tables/towers.csv", "thesis_mean"),
     "5.1.4": ("tables/voxelisation.csv", "thesis_seconds"),
     "Table 5.3": ("tables/models.csv", "thesis_precision"),
-    "5.2.6": ("tables/times.csv", "thesis_training_seconds"),
+    "Figure 5.5": ("tables/parameters.csv", "thesis"),
+    "5.2.6, training": ("tables/times.csv", "thesis_training_seconds"),
+    "5.2.6, inference": ("tables/times.csv", "thesis_inference_ms"),
+    "5.2.6, useful CNN": ("tables/times.csv", "thesis_useful_seconds"),
+    "3.4, 4.3": ("tables/certificate.csv", "thesis"),
     "Table 5.5": ("tables/study-ablations.csv", "thesis_precision"),
     "chapter 5": ("tables/thesis_and_ours.csv", "thesis"),
 }
 FIGURES = {
     "Figures 4.2-4.4": "kernels-scenenet",
-    "Figures 5.1, 5.3": "surveys",
+    "Figure 5.1": "labels-first",
+    "Figure 5.3": "surveys",
     "Figure 5.2": "clusters-first",
     "Figure 5.4": "voxels",
     "Figure 5.5": "parameters-scenenet",
@@ -30,6 +38,7 @@ FIGURES = {
     "Figures 5.8, 5.9, best": "crop-best",
     "Figures 5.8, 5.9, median": "crop-median",
     "Figures 5.8, 5.9, worst": "crop-worst",
+    "Figure 5.10": "resolutions",
     "Table 5.5": "study-ablations",
     "5.2.5": "noise",
 }
@@ -85,6 +94,61 @@ def test_5_2_5_is_a_study_of_wrong_labels_with_the_truth_beside(finished):
     assert logged["experiment"].endswith("-noise")
     page = (finished.results / "report" / "index.html").read_text()
     assert "Trained on wrong labels" in page
+
+
+@pytest.mark.parametrize("place", FIGURES)
+def test_a_figure_is_on_the_page_and_says_which_of_the_thesis_it_stands_beside(finished, place):
+    said = read_json(finished.results / "figures" / f"{FIGURES[place]}.json")
+    page = (finished.results / "report" / "index.html").read_text(encoding="utf-8")
+    assert escape(said["alt"]) in page
+    number = re.search(r"\d[.\d]*\d", place)
+    assert number[0] in said["caption"], said["caption"]
+
+
+def test_the_three_kernels_are_drawn_before_training_and_after(finished):
+    said = read_json(finished.results / "figures" / "kernels-scenenet.json")
+    for kernel in ("cylinder", "arrow", "negative_sphere"):
+        for stage in ("at the start", "trained"):
+            assert f"{kernel} {stage} from" in said["alt"]
+    assert "drawn from the seed" in said["caption"]
+
+
+def test_every_number_is_in_metres_and_read_out(finished):
+    table = pd.read_csv(finished.results / "tables" / "parameters.csv")
+    assert len(table) == 12
+    assert set(table["unit"].astype(str)) == {"m", "m^2", "1"}
+    assert table["initial"].notna().all()
+    assert (table["sentence"].str.len() > 20).all()
+    page = (finished.results / "report" / "index.html").read_text(encoding="utf-8")
+    for sentence in table["sentence"]:
+        assert escape(sentence) in page
+
+
+def test_times_are_measured_and_memory_is_that_of_a_process_with_torch(finished):
+    table = pd.read_csv(finished.results / "tables" / "times.csv").set_index("model")
+    for model in ("scenenet", "cnn"):
+        row = table.loc[model]
+        assert 0 < row["inference_ms"] < row["inference_ms_128"]
+        assert row["training_seconds"] > 0
+    assert (table["peak_memory_mb"] > 100).all()
+    assert "black box" in table.index
+
+
+def test_what_is_certain_of_a_scenenet_is_said_and_the_opening_names_who_predicts(finished):
+    table = pd.read_csv(finished.results / "tables" / "certificate.csv")
+    ours = table[table["model"] == "scenenet"].set_index("property")
+    assert len(ours) == 8
+    for exact in ("translation by whole voxels", "quarter turns about z"):
+        assert bool(ours.loc[f"equivariant under {exact}", "holds"])
+    page = (finished.results / "report" / "index.html").read_text(encoding="utf-8")
+    opening = page[page.index('id="overview"') :].partition("</section>")[0]
+    for said in (
+        "scenenet (seed",
+        "is the model that predicts",
+        "cnn (seed",
+        "black box (all seeds)",
+    ):
+        assert said in opening
 
 
 @pytest.mark.parametrize("rank", ["best", "median", "worst"])

@@ -113,6 +113,7 @@ FIGURES = [drawing.name for drawing in _planned]
 MODEL_FIGURES = [drawing.name for drawing in _planned if drawing.models]
 ALL_PICTURES = [
     *FIGURES,
+    *(f"labels-{survey}" for survey in MAPPED),
     *(f"clusters-{survey}" for survey in MAPPED),
     *(f"prediction-{survey}" for survey in NEW),
     *(f"study-{study}" for study in STUDIED),

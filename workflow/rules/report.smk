@@ -89,6 +89,35 @@ rule figures:
         "../scripts/figures.py"
 
 
+rule survey_map:
+    input:
+        survey=lambda w: source(w.survey),
+    output:
+        **shown_picture("labels", "data", {"figure": "{survey}, coloured by its labels"}),
+        provenance=f"{R}/figures/labels-{{survey}}.provenance.json",
+    log:
+        f"{R}/logs/survey_map/{{survey}}.log",
+    benchmark:
+        f"{R}/benchmarks/survey_map/{{survey}}.tsv"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=30,
+    params:
+        job=lambda w: job(
+            "figures",
+            {},
+            results=gathered(models=[], surveys=[w.survey]),
+            pictures=[f"labels-{w.survey}"],
+            sources={w.survey: [SURVEYS[w.survey].path, SURVEYS[w.survey].codes]},
+            input={"survey": source_print(w.survey)},
+        ),
+    message:
+        "Drawing the labels of {wildcards.survey}"
+    script:
+        "../scripts/figures.py"
+
+
 rule tower_map:
     input:
         survey=lambda w: source(w.survey),

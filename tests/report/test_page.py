@@ -119,10 +119,9 @@ def test_numbers_are_read_out_and_what_is_certain_is_said(page: Path):
         "scenenet: 6 of 8 hold",
         "convex combination of GENEOs",
         "cnn is a convolution",
+        "a crop of 64³ [ms]",
     ):
         assert said in found.text
-    for said in ("8 ms", "12 ms"):
-        assert said.split()[0] in found.text
 
 
 def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: Thesis):

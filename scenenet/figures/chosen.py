@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenenet.errors import InputError
+from scenenet.figures.beside import kinds_of
 from scenenet.results import Results, SeedResult, read_table
 
 if TYPE_CHECKING:
@@ -57,8 +58,15 @@ def crop_cloud(results: Results, sample: Mapping[str, Any]) -> PointCloud:
 
 
 def class_groups(cloud: PointCloud) -> np.ndarray:
-    """(N,) what each point is, as ``figures.CLASS_COLOURS`` names it."""
+    """(N,) what each point is, as ``figures.CLASS_COLOURS`` names it.
+
+    The public TS40K crops code trees otherwise than Table 5.1 says (``figures.beside.EDP_KINDS``).
+    """
     groups = np.full(len(cloud), "other", dtype="U10")
+    if cloud.scheme is not None and cloud.scheme.name == "edp":
+        kinds = kinds_of(cloud.classification)
+        groups[np.isin(kinds, ("low", "tall"))] = "vegetation"
+        groups[kinds == "ground"] = "ground"
     for name in ("ground", "vegetation", "wire", "tower"):
         groups[np.isin(cloud.classification, list(getattr(cloud.scheme, name)))] = name
     return groups

@@ -17,6 +17,7 @@ NOTHING = "–"
 
 Format = Literal[
     "text",
+    "sentence",
     "count",
     "score",
     "score2",
@@ -50,7 +51,7 @@ class Column:
 
     @property
     def numeric(self) -> bool:
-        return self.format not in ("text", "yes")
+        return self.format not in ("text", "sentence", "yes")
 
 
 @dataclass(frozen=True)
@@ -179,6 +180,7 @@ def _seconds(value: float) -> str:
 
 _WRITERS: Mapping[str, Callable[[Any], str]] = {
     "text": str,
+    "sentence": str,
     # A narrow space between thousands, as SI has it: no language reads it as a decimal sign.
     "count": lambda value: f"{round(value):,}".replace(",", "\u202f"),
     "score": lambda value: f"{value:.3f}",

@@ -38,7 +38,7 @@ def _numbers(material: Material) -> list[Block]:
         Column("unit", "unit"),
         Column("initial", "at the start", "number"),
         Column("thesis", "thesis", "number", published=True),
-        Column("sentence", "what it says"),
+        Column("sentence", "what it says", "sentence"),
     ]
     shown = frame.assign(
         parameter=frame["parameter"].str.replace("_", " ").str.replace(".", ": "),
@@ -71,9 +71,9 @@ def certificate(material: Material) -> Section | None:
         )
     ]
     columns = [
-        Column("property", "property"),
+        Column("property", "property", "sentence"),
         Column("holds", "holds", "yes"),
-        Column("found", "how far"),
+        Column("found", "how far", "sentence"),
         Column("thesis", "thesis"),
     ]
     for model, rows in frame.groupby("model", sort=False):
@@ -87,7 +87,7 @@ def certificate(material: Material) -> Section | None:
             said = f"Measured on {scene}, at the voxel size the model predicts with."
         caption = f"{model}, seed {rows['seed'].iloc[0]:.0f}. {said}"
         blocks += [
-            Heading(f"{model}: {rows['holds'].sum()} of {len(rows)} hold"),
+            Heading(f"{model}: {rows['holds'].sum()} of {len(rows)} properties hold"),
             table(rows, columns, caption, "tables/certificate.csv"),
         ]
     moved = material.table("certificate_turns")

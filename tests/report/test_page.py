@@ -116,7 +116,7 @@ def test_numbers_are_read_out_and_what_is_certain_is_said(page: Path):
     for said in (
         "speaks most for a tower",
         "76.34 %",
-        "scenenet: 6 of 8 hold",
+        "scenenet: 6 of 8 properties hold",
         "convex combination of GENEOs",
         "cnn is a convolution",
         "a crop of 64³ [ms]",

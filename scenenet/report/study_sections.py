@@ -14,6 +14,12 @@ from scenenet.report.blocks import Block, Column, Facts, Figure, Heading, Sectio
 from scenenet.report.material import VOXEL_SCORES, Material, beside
 from scenenet.studies.findings import findings
 
+NEGATIVE = (
+    Column("negative_share", "seeds with a negative number", "score2"),
+    Column("lowest_weight", "lowest weight", "score"),
+    Column("lowest_shape", "lowest shape parameter", "score"),
+)
+"""How convex a model is left (thesis 5.3.3), where any is left otherwise."""
 VERDICTS = (REPRODUCED, BETTER, NOT, UNMEASURED)
 
 
@@ -30,8 +36,7 @@ def studies(material: Material) -> Section | None:
             Column("alive", f"alive of {len(study.seeds)}", "count"),
             *beside(VOXEL_SCORES),
             Column("parameters", "parameters", "count"),
-            Column("negative_share", "seeds with a negative number", "score2"),
-            Column("lowest_weight", "lowest weight", "score"),
+            *(NEGATIVE if frame["negative_share"].max() > 0 else ()),
             Column("training_crops", "crops", "count"),
             Column("training_seconds", "training", "seconds"),
         ]

@@ -131,6 +131,7 @@ def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: T
         thesis_says="one of each is best.",
     )  # fmt: skip
     rows = [dict.fromkeys(COLUMNS, 0.5) | {"variant": v, "seed": s, "precision": 0.3 + s / 10}
+            | {"lowest_weight": -0.125 if v == "A" else 0.25}
             for v in "EA" for s in (0, 1)]  # fmt: skip
     folder = results.folder / "studies" / "ablations"
     folder.mkdir(parents=True)
@@ -144,7 +145,8 @@ def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: T
     assert "studies" in [section["id"] for section in found.all("section")]
     shown = ["Which operators?", "What does it need?", "0.35 ± 0.07", "0.68"]
     concluded = ["Best here: E with an F0.5 of 0.50", "The thesis: one of each is best."]
-    for said in shown + concluded:
+    negative = ["seeds with a negative number", "E 0 of 2 seeds, A 2 of 2 seeds", "-0.125"]
+    for said in shown + concluded + negative:
         assert said in found.text
     assert any("E: precision 0.35" in (image["alt"] or "") for image in found.all("img"))
 

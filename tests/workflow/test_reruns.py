@@ -30,8 +30,8 @@ SCORED = {
 """What follows from trained models: two of each kind."""
 
 TRAINED = {"train": 2, "train_cnn": 2, **SCORED}
-STUDIED = {"study": 1, "study_figure": 1, "track_studies": 1}
-"""There is one study, of one model."""
+STUDIED = {"study": 2, "study_figure": 2, "track_studies": 1}
+"""There are two studies, of one model."""
 BLACK_BOX = {"black_box": 1}
 LEARNED = {**TRAINED, **STUDIED, **BLACK_BOX}
 """What follows from other crops."""
@@ -165,8 +165,9 @@ def test_another_study_runs_itself_and_what_shows_it(project):
     study = {"name": "seeds", "title": "t", "place": "5.3", "asks": "?", "seeds": [0, 1]}
     told = [*project.configured("studies"), {**study, "variants": [{"name": "as it is"}]}]
     project.configure({"studies": told})
+    own = {"study": 1, "study_figure": 1, "track_studies": 1}
     shown = {"tables": 1, "report": 1, "mlflow_store": 1, "track": 1, "register": 1}
-    assert project.planned() == {**SETTINGS, **STUDIED, **shown}
+    assert project.planned() == {**SETTINGS, **own, **shown}
 
 
 # Code
@@ -265,5 +266,5 @@ def test_what_others_log_to_the_mlflow_store_runs_nothing(project):
 
 def test_other_published_numbers_are_put_beside_ours_without_training(project):
     project.edit("config/thesis.yaml", "source: ", "source: Once more, ")
-    drawn = {"figures": 1, "study_figure": 1, "track": 1, "track_studies": 1, "register": 1}
+    drawn = {"figures": 1, "study_figure": 2, "track": 1, "track_studies": 1, "register": 1}
     assert project.planned() == {"tables": 1, **drawn, "report": 1}

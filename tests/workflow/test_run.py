@@ -97,8 +97,11 @@ def test_the_model_file_names_code_settings_and_data(finished):
 def test_every_training_is_a_run_in_mlflow(finished):
     runs = read_json(finished.results / "mlflow/runs.json")["runs"]
     assert len(runs) == 3 * (1 + 2)  # a group and two seeds for each model and the black box
-    studied = read_json(finished.results / "mlflow/study-ablations.json")["runs"]
-    assert len(studied) == 2 * (1 + 1)  # two variants from one seed
+    studied = {}
+    for study, variants in (("ablations", 2), ("starts", 3)):
+        logged = read_json(finished.results / f"mlflow/study-{study}.json")["runs"]
+        assert len(logged) == variants * (1 + 1)  # from one seed
+        studied |= logged
     with sqlite3.connect(finished.folder / "mlflow.db") as store:
         (active,) = store.execute(
             "SELECT count(*) FROM runs WHERE lifecycle_stage = 'active'"

@@ -25,6 +25,7 @@ TABLES = {
     "5.2.6, useful CNN": ("tables/times.csv", "thesis_useful_seconds"),
     "3.4, 4.3": ("tables/certificate.csv", "thesis"),
     "Table 5.5": ("tables/study-ablations.csv", "thesis_precision"),
+    "5.2.6, starts": ("tables/study-starts.csv", "alive"),
     "chapter 5": ("tables/thesis_and_ours.csv", "thesis"),
 }
 FIGURES = {
@@ -41,6 +42,7 @@ FIGURES = {
     "Figure 5.10": "resolutions",
     "Table 5.5": "study-ablations",
     "5.2.5": "noise",
+    "5.2.6, starts": "study-starts",
 }
 STUDIES = {
     "ablations": "Table 5.5",

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from scenenet.coarse import block_edge
 from scenenet.detection import DetectionSettings
 from scenenet.errors import InputError
 from scenenet.files import write_json
@@ -63,6 +62,7 @@ def predict_survey(
     Raises:
         InputError: the survey or the model cannot be used.
     """
+    from scenenet.coarse import block_edge
     from scenenet.modelfile import read_model
     from scenenet.models import SceneNet
 

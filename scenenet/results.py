@@ -77,8 +77,8 @@ class SeedResult:
 class Results:
     """A result folder and what was asked for in it.
 
-    Nothing is read on construction. A stage that left nothing (TS40K samples have no survey to
-    check) gives empty answers; a file that is there and broken is an error.
+    Nothing is read on construction. A stage that left nothing gives empty answers; a
+    file that is there and broken is an error.
 
     Attributes:
         folder: the result folder.

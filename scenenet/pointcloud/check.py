@@ -6,7 +6,7 @@ those of thesis Table 5.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +20,8 @@ from scenenet.pointcloud.header import read_header
 from scenenet.pointcloud.kinds import kind_of
 from scenenet.pointcloud.las import class_codes, coordinates, iter_records
 from scenenet.pointcloud.report import SurveyReport, class_table, find_warnings
-from scenenet.pointcloud.schemes import class_scheme
+from scenenet.pointcloud.samples import sample_files
+from scenenet.pointcloud.schemes import ClassScheme, class_scheme
 from scenenet.pointcloud.survey import iter_chunks, survey_info
 from scenenet.pointcloud.tally import CellCounts, DuplicateCount
 from scenenet.settings import Settings
@@ -96,7 +97,8 @@ def check_survey(
     """Read a survey once and report what is in it.
 
     Args:
-        path: LAS, LAZ, COPC, .npy or .pt file.
+        path: LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples, which are taken
+            together.
         codes: class scheme of its codes; None where nobody has said: classes stay numbers.
         settings: how to check.
 
@@ -108,6 +110,9 @@ def check_survey(
     """
     settings = settings or CheckSettings()
     path = Path(path)
+    if path.is_dir():
+        reports = [check_survey(sample, codes, settings) for sample in sample_files(path)]
+        return _together(path, reports, None if codes is None else class_scheme(codes))
     scheme = None if codes is None else class_scheme(codes)
     info = survey_info(path)
     header = read_header(path) if kind_of(path) == "las" else None
@@ -209,6 +214,46 @@ def _report(info, told, degrees, unit, tally, scheme, settings) -> SurveyReport:
     classes = class_table(tally.counts, scheme)
     warnings = find_warnings(facts, tally.counts, scheme, told, info.warnings)
     return SurveyReport(facts, classes, tuple(warnings))
+
+
+SUMMED = (
+    "n_points", "duplicated_points", "stray_points", "points_outside_header_box",
+    "points_without_gps_time", "withheld_points", "impossible_returns",
+)  # fmt: skip
+
+
+def _together(
+    folder: Path, reports: Sequence[SurveyReport], scheme: ClassScheme | None
+) -> SurveyReport:
+    """The samples of a folder as one survey; ``samples`` is their number."""
+    each = [report.facts for report in reports]
+    counts = np.zeros(256, np.int64)
+    for report in reports:
+        counts[report.classes["code"].to_numpy(int)] += report.classes["points"].to_numpy(int)
+    facts = {**each[0], "survey": folder.name, "samples": len(each)}
+    facts |= {name: sum(one[name] for one in each) for name in SUMMED}
+    facts["duplicates_estimated"] = any(one["duplicates_estimated"] for one in each)
+    for ends, of_both in (("mins", np.min), ("maxs", np.max)):
+        for name in (ends, f"header_{ends}"):
+            known = [one[name] for one in each if one[name] is not None]
+            facts[name] = of_both(known, axis=0).tolist() if known else None
+    areas = [one["area_m2"] for one in each if one["area_m2"]]
+    facts["area_m2"] = sum(areas) if areas else None
+    facts["density_per_m2"] = facts["n_points"] / facts["area_m2"] if areas else None
+    warnings = find_warnings(facts, counts, scheme, CrsRecord(None, None), ())
+    if scheme is not None and any(counts[code] for code in scheme.tower):
+        without = [report.facts["survey"] for report in reports if not _has_tower(report, scheme)]
+        if without:
+            listed = ", ".join(without[:5]) + (" and more" if len(without) > 5 else "")
+            warnings.append(
+                f"no point is labelled tower in {len(without)} of {len(each)} samples: {listed}"
+            )
+    return SurveyReport(facts, class_table(counts, scheme), tuple(warnings))
+
+
+def _has_tower(report: SurveyReport, scheme: ClassScheme) -> bool:
+    classes = report.classes
+    return bool(classes.loc[classes["code"].isin(scheme.tower), "points"].sum())
 
 
 def _finite(values: np.ndarray) -> list[float] | None:

@@ -4,27 +4,55 @@ seed, with the same names of metrics."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scenenet.contests.cross_table import SCORES, summarise_folds
 from scenenet.contests.noise_table import LABELS
-from scenenet.tracking.runs import RunGroup, RunRecord
+from scenenet.tracking.records import origin_tags
+from scenenet.tracking.runs import NOTE_TAG, RunGroup, RunRecord
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from scenenet.figures import Picture
+
 NOT_METRICS = ("seed", "model", "level", "fold", "crops")
 
 
-def noise_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
+@dataclass(frozen=True)
+class Origin:
+    """What all runs of a contest share.
+
+    Attributes:
+        dataset: name of the data, part of every key, so that runs of other data stand beside.
+        tags: what they were made from and by.
+        pictures: figures of the whole contest, attached to every parent.
+    """
+
+    dataset: str
+    tags: Mapping[str, str] = field(default_factory=dict)
+    pictures: Sequence[Picture] = ()
+
+
+def origin_of(
+    dataset: str,
+    gathered: Mapping[str, Any],
+    job: Mapping[str, Any],
+    pictures: Sequence[Picture] = (),
+) -> Origin:
+    """What the runs share, from the record of the gathered table and that of one of its jobs: the
+    settings and the code are those of the jobs, the data those of all of them."""
+    return Origin(dataset, origin_tags({**job, "inputs": gathered.get("inputs", {})}), pictures)
+
+
+def noise_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
     """The runs of the noise study.
 
     Args:
         runs: of ``scenenet.contests.noise``, a row per level, seed and model.
-        dataset: name of the data, part of every key, so that runs of other data stand beside.
     """
     groups = []
     for (level, model), rows in runs.groupby(["level", "model"], sort=False):
@@ -37,17 +65,16 @@ def noise_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
         )
         case = {"level": float(level), "model": str(model)}
         groups.append(
-            group_of("noise", dataset, f"{model}, {level:.0%} wrong", case, rows, told, "5.2.5")
+            group_of("noise", origin, f"{model}, {level:.0%} wrong", case, rows, told, "5.2.5")
         )
     return groups
 
 
-def fold_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
+def fold_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
     """The runs of the cross-validation: a parent for each model, a run for each seed and fold.
 
     Args:
         runs: of ``scenenet.contests.cross_validation``.
-        dataset: name of the data, as for ``noise_groups``.
     """
     summary = summarise_folds(runs).set_index("model")
     groups = []
@@ -59,7 +86,7 @@ def fold_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
             "the counts of all folds together."
         )
         group = group_of(
-            "cross_validation", dataset, str(model), {"model": str(model)}, rows, told, "5.2.4",
+            "cross_validation", origin, str(model), {"model": str(model)}, rows, told, "5.2.4",
             lambda row: f"seed-{row['seed']}/fold-{row['fold']}",
         )  # fmt: skip
         more = {f"spread_{name}": _number(row[f"{name}_std"]) for name in SCORES}
@@ -71,7 +98,7 @@ def fold_groups(runs: pd.DataFrame, dataset: str) -> list[RunGroup]:
 
 def group_of(
     contest: str,
-    dataset: str,
+    origin: Origin,
     name: str,
     case: Mapping[str, Any],
     rows: pd.DataFrame,
@@ -88,8 +115,9 @@ def group_of(
         place: where the thesis asks for it.
         child: what tells a row from the others.
     """
-    key = f"{contest}/{dataset}/{name}"
-    tags = {"study": contest, "dataset": dataset, "place": place, "model": str(case["model"])}
+    key = f"{contest}/{origin.dataset}/{name}"
+    tags = {"study": contest, "dataset": origin.dataset, "place": place, **origin.tags}
+    tags["model"] = str(case["model"])
     numbers = [c for c in rows.columns if c not in NOT_METRICS]
     children = []
     for row in rows.to_dict("records"):
@@ -111,7 +139,8 @@ def group_of(
         name=name,
         params=case,
         metrics=_means(children),
-        tags=tags | {"mlflow.note.content": f"{told} Mean over {len(rows)} runs. Thesis {place}."},
+        tags=tags | {NOTE_TAG: f"{told} Mean over {len(rows)} runs. Thesis {place}."},
+        artifacts={f"figures/{p.file.name}": p.file for p in origin.pictures},
         seconds=sum(record.seconds for record in children),
     )
     return RunGroup(parent, children)
@@ -134,7 +163,14 @@ def _means(children: Sequence[RunRecord]) -> dict[str, float | None]:
     return means
 
 
-CONTEST_GROUPS: Mapping[str, Callable[[pd.DataFrame, str], list[RunGroup]]] = {
+CONTEST_NOTES = {
+    "cross_validation": "Every crop a test crop once, over all models and seeds.",
+    "noise": "Trained on labels of which a known share is wrong, scored against such labels and "
+    "against the truth. Thesis 5.2.5.",
+}
+"""What the experiment of each contest says of itself."""
+
+CONTEST_GROUPS: Mapping[str, Callable[[pd.DataFrame, Origin], list[RunGroup]]] = {
     "cross_validation": fold_groups,
     "noise": noise_groups,
 }

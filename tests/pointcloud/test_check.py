@@ -105,6 +105,36 @@ def test_without_a_scheme_codes_stay_numbers_and_mean_nothing(grid_survey):
     assert report.warnings == ()
 
 
+def test_the_samples_of_a_folder_are_checked_together(tmp_path):
+    rng = np.random.default_rng(0)
+    folder = tmp_path / "samples"
+    folder.mkdir()
+    shares = {"a.npy": (300, 100), "b.npy": (200, 0)}
+    for number, (name, (ground, tower)) in enumerate(shares.items()):
+        xyz = rng.uniform(0, 10, (ground + tower, 3))
+        xyz[:, 0] += 100 * number
+        codes = np.repeat([2, 15], [ground, tower])
+        np.save(folder / name, np.column_stack([xyz, codes]))
+    (folder / "notes.txt").write_text("no sample")
+    report = check_survey(folder, "edp")
+    single = [check_survey(folder / name, "edp") for name in shares]
+    points = report.classes.set_index("code")["points"]
+    assert (points[2], points[15], points.sum()) == (500, 100, 600)
+    assert report.classes.set_index("code").loc[15, "share_percent"] == pytest.approx(100 / 6)
+    facts = report.to_dict()
+    assert (facts["survey"], facts["samples"], facts["n_points"]) == ("samples", 2, 600)
+    assert facts["area_m2"] == sum(one.facts["area_m2"] for one in single)
+    assert facts["mins"][0] < 1 and facts["maxs"][0] > 109
+    assert "no point is labelled tower in 1 of 2 samples: b.npy" in report.warnings
+    assert "samples: NPY" in report.text()
+    assert json.loads(json.dumps(facts)) == facts
+
+
+def test_a_folder_without_samples_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no TS40K sample"):
+        check_survey(tmp_path, "edp")
+
+
 def test_merged_classes_of_a_ts40k_sample_taken_for_edp_are_warned_of(tmp_path):
     path = tmp_path / "sample.pt"
     codes = torch.tensor([1, 4, 5, 2])

@@ -14,7 +14,7 @@ from scenenet.figures import draw_all, plan
 from scenenet.report import contest_sections
 from scenenet.report.material import Material
 from scenenet.tables import write_tables
-from scenenet.tracking.contests import fold_groups, noise_groups
+from scenenet.tracking.contests import Origin, fold_groups, noise_groups, origin_of
 
 
 def noise_runs() -> pd.DataFrame:
@@ -57,7 +57,7 @@ def test_no_contest_no_section(results, thesis):
 
 
 def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
-    groups = noise_groups(noise_runs(), "tiny")
+    groups = noise_groups(noise_runs(), Origin("tiny"))
     assert len(groups) == 9
     group = next(g for g in groups if g.parent.name == "scenenet, 60% wrong")
     assert [child.key for child in group.children] == [
@@ -104,7 +104,9 @@ def test_cross_validation_is_the_main_result_where_it_is_there(results, thesis):
 
 
 def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():
-    (group, *_) = groups = fold_groups(crossed_runs(), "ts40k")
+    job = {"config": "c", "code": "d", "version": "1", "inputs": {"voxels": "x"}}
+    origin = origin_of("ts40k", {"inputs": {"runs": "y"}}, job)
+    (group, *_) = groups = fold_groups(crossed_runs(), origin)
     assert [g.parent.name for g in groups] == ["scenenet", "cnn", "black box"]
     assert [child.key for child in group.children] == [
         f"cross_validation/ts40k/scenenet/seed-{seed}/fold-{fold}"
@@ -115,3 +117,4 @@ def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():
     assert group.parent.metrics["spread_f05"] == pytest.approx(0.02 / 2**0.5)
     assert group.parent.metrics["pooled_precision"] == pytest.approx(5 / 6)
     assert group.children[1].params["crops"] == "c d"
+    assert group.parent.tags["scenenet.code"] == group.children[0].tags["scenenet.code"] == "d"

@@ -9,6 +9,13 @@ CROSSED = {
 NOISE_SEEDS = settings.noise.seeds if "noise" in CONTESTS else []
 
 
+# Of the jobs of a contest, all of the same settings and code, one speaks for the others.
+FIRST_RECORD = {
+    "cross_validation": f"{R}/cross_validation/{next(iter(CROSSED))}/provenance.json",
+    "noise": f"{R}/noise/seed-{next(iter(NOISE_SEEDS), 0)}.provenance.json",
+}
+
+
 rule cross_validate:
     input:
         stores=VOXEL_STORES,
@@ -166,6 +173,10 @@ rule track_contest:
     input:
         store=f"{R}/mlflow/store.json",
         runs=f"{R}/{{contest}}/runs.csv",
+        gathered=f"{R}/{{contest}}/provenance.json",
+        record=lambda w: FIRST_RECORD[w.contest],
+        pictures=f"{R}/figures/{{contest}}.png",
+        captions=f"{R}/figures/{{contest}}.json",
     output:
         runs=f"{R}/mlflow/{{contest}}.json",
         provenance=f"{R}/mlflow/{{contest}}.provenance.json",

@@ -60,10 +60,12 @@ def print_scores():
     print(f"Report: {R}/report/index.html")
 
 
-# A folder of TS40K samples is no survey: there is no corridor to check, and no map to draw.
-CHECKED = [name for name, survey in SURVEYS.items() if not Path(survey.path).is_dir()]
+CHECKED = list(SURVEYS)
+# TS40K samples are single crops: there is no map to draw.
 MAPPED = [
-    name for name in TRAIN if name in CHECKED and not SURVEYS[name].path.endswith((".npy", ".pt"))
+    name
+    for name in TRAIN
+    if not Path(SURVEYS[name].path).is_dir() and not SURVEYS[name].path.endswith((".npy", ".pt"))
 ]
 
 CROP_STORES = expand(f"{R}/crops/{{survey}}/crops.zarr.zip", survey=TRAIN)
@@ -72,9 +74,7 @@ VOXEL_STORES = expand(f"{R}/voxels/{{survey}}/{GRID}/voxels.zarr.zip", survey=TR
 VOXEL_MANIFESTS = expand(f"{R}/voxels/{{survey}}/{GRID}/manifest.json", survey=TRAIN)
 CROPS = [*CROP_STORES, *CROP_MANIFESTS]
 VOXELS = [*VOXEL_STORES, *VOXEL_MANIFESTS]
-CLASS_COUNTS = expand(
-    f"{R}/check/{{survey}}/classes.csv", survey=[s for s in TRAIN if s in CHECKED]
-)
+CLASS_COUNTS = expand(f"{R}/check/{{survey}}/classes.csv", survey=TRAIN)
 TRAININGS = [
     *each_training(f"{R}/train/{{model}}/seed-{{seed}}/history.csv"),
     *each_training(f"{R}/train/{{model}}/seed-{{seed}}/provenance.json"),

@@ -4,15 +4,21 @@ import adapter
 
 
 def track_contest(job: adapter.Job) -> None:
-    from scenenet.results import read_table
+    from pathlib import Path
+
+    from scenenet.figures import read_pictures
+    from scenenet.results import read_result, read_table
     from scenenet.tracking import TrackingSettings, log_runs
-    from scenenet.tracking.contests import CONTEST_GROUPS
+    from scenenet.tracking.contests import CONTEST_GROUPS, CONTEST_NOTES, origin_of
     from scenenet.tracking.studies import experiment_of
 
     contest = job.identity["contest"]
     settings = experiment_of(TrackingSettings(**job.settings), contest)
-    groups = CONTEST_GROUPS[contest](read_table(job.input.runs), job.identity["dataset"])
-    log_runs(settings, groups, job.output.runs, job.input.store)
+    records = [read_result(Path(path)) for path in (job.input.gathered, job.input.record)]
+    pictures = read_pictures(Path(job.input.pictures).parent, [contest])
+    origin = origin_of(job.identity["dataset"], *records, pictures)
+    groups = CONTEST_GROUPS[contest](read_table(job.input.runs), origin)
+    log_runs(settings, groups, job.output.runs, job.input.store, CONTEST_NOTES[contest])
 
 
 adapter.run(track_contest)

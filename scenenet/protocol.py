@@ -13,6 +13,8 @@ from scenenet.settings import Settings
 
 Positive = Annotated[int, Field(ge=1)]
 KernelSize = tuple[Positive, Positive, Positive]
+BLACK_BOX = "black box"
+"""What tables call the boosted trees of ``scenenet.blackbox``."""
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
 Measurement = Literal["presence", "density"]
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenenet.errors import InputError
 from scenenet.files import read_json
+from scenenet.protocol import BLACK_BOX
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,10 +19,6 @@ if TYPE_CHECKING:
 
 HISTORY_MEASURES = frozenset({"epoch", "loss", "fidelity", "penalty", "seconds", "learning_rate"})
 """Columns of a training history that are not parameters of the model."""
-
-
-BLACK_BOX = "black box"
-"""What tables call the boosted trees of ``scenenet.blackbox``."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from scenenet.contests.folds import folds
 from scenenet.detection import DetectionSettings
 from scenenet.files import atomic
 from scenenet.progress import track
-from scenenet.protocol import ModelSettings
-from scenenet.results import BLACK_BOX
+from scenenet.protocol import BLACK_BOX, ModelSettings
 from scenenet.rivals import train_rival
 from scenenet.voxel_store import Dataset, load
 

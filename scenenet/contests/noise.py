@@ -14,14 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scenenet.contests.noise_table import AGAINST, LABELS, SCORES
 from scenenet.contests.noisy_line import NoisyLine, noisy_lines
-from scenenet.contests.settings import NoiseSettings
+from scenenet.contests.settings import AGAINST, LABELS, SCORES, NoiseSettings
 from scenenet.files import atomic
 from scenenet.metrics import Confusion
 from scenenet.progress import track
-from scenenet.protocol import ModelSettings
-from scenenet.results import BLACK_BOX
+from scenenet.protocol import BLACK_BOX, ModelSettings
 from scenenet.rivals import Rival, train_rival
 from scenenet.voxels import VoxelSample, VoxelSettings
 

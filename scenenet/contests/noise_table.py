@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from scenenet.contests.settings import AGAINST, LABELS, SCORES
+
 if TYPE_CHECKING:
     import pandas as pd
 
-AGAINST = ("labels", "truth")
-"""What a model that was trained on wrong labels is scored against."""
-SCORES = ("precision", "recall", "f05", "iou_tower")
-LABELS = "the labels"
-"""What tables call the labels themselves, as if they were the answer of a model."""
 MEASURED = (*(f"{against}_{score}" for against in AGAINST for score in SCORES), "wrong_detected")
 
 

@@ -8,9 +8,14 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenenet.protocol import ModelSettings, Positive
-from scenenet.settings import Settings
-from scenenet.studies.settings import changed
+from scenenet.settings import Settings, changed
 from scenenet.synthetic.settings import SyntheticSettings
+
+AGAINST = ("labels", "truth")
+"""What a model that was trained on wrong labels is scored against."""
+SCORES = ("precision", "recall", "f05", "iou_tower")
+LABELS = "the labels"
+"""What tables call the labels themselves, as if they were the answer of a model."""
 
 Seed = Annotated[int, Field(ge=0)]
 Level = Annotated[float, Field(ge=0, lt=1)]

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.contests.cross_table import summarise_folds
-from scenenet.contests.noise_table import LABELS, summarise_noise
+from scenenet.contests.noise_table import summarise_noise
+from scenenet.contests.settings import LABELS
 from scenenet.figures.style import COLOURS, new_figure, save
 from scenenet.results import Results
 

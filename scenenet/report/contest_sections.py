@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from scenenet.contests.noise_table import LABELS, claim, findings
+from scenenet.contests.noise_table import claim, findings
+from scenenet.contests.settings import LABELS
 from scenenet.report.blocks import Column, Facts, Notes, Section, Text, table
 from scenenet.report.material import Material
 

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import Any, Literal, Self, TypeVar
+from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
 from scenenet.protocol import KernelSize, ModelSettings
-from scenenet.settings import Settings
+from scenenet.settings import Settings, changed
 from scenenet.split import SplitSettings
 from scenenet.voxels import VoxelSettings
-
-S = TypeVar("S", bound=Settings)
 
 
 class Variant(Settings):
@@ -144,22 +141,6 @@ def _plan(
         fault = error.errors()[0]
         place = ".".join(map(str, fault["loc"]))
         raise ValueError(f"study {study}, {variant.name}: {place}: {fault['msg']}") from None
-
-
-def changed(settings: S, changes: Mapping[str, Any]) -> S:
-    """``settings`` with dotted ``changes``, checked anew.
-
-    Raises:
-        ValidationError: a change names no setting, or is none that it can be.
-    """
-    raw = settings.model_dump()
-    for dotted, value in changes.items():
-        *path, last = dotted.split(".")
-        place = raw
-        for step in path:
-            place = place.setdefault(step, {})
-        place[last] = value
-    return type(settings).model_validate(raw)
 
 
 def _named(changes: dict[str, Any]) -> Variant:

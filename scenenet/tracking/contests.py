@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenenet.contests.cross_table import SCORES, summarise_folds
-from scenenet.contests.noise_table import LABELS
+from scenenet.contests.settings import LABELS
 from scenenet.tracking.records import origin_tags
 from scenenet.tracking.runs import NOTE_TAG, RunGroup, RunRecord
 

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 
 from scenenet.contests.noise import COLUMNS, run_noise
-from scenenet.contests.noise_table import LABELS, claim, findings, summarise_noise
+from scenenet.contests.noise_table import claim, findings, summarise_noise
 from scenenet.contests.noisy_line import noisy_lines
-from scenenet.contests.settings import Contender, NoiseSettings, contenders
+from scenenet.contests.settings import LABELS, Contender, NoiseSettings, contenders
 from scenenet.metrics import Confusion
 from scenenet.protocol import ModelSettings
 from scenenet.rivals import train_rival

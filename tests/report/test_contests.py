@@ -9,7 +9,7 @@ import pytest
 
 from scenenet.contests import cross_validation
 from scenenet.contests.noise import COLUMNS
-from scenenet.contests.noise_table import LABELS
+from scenenet.contests.settings import LABELS
 from scenenet.figures import draw_all, plan
 from scenenet.report import contest_sections
 from scenenet.report.material import Material

@@ -32,6 +32,8 @@ SCORED = {
 TRAINED = {"train": 2, "train_cnn": 2, **SCORED}
 STUDIED = {"study": 2, "study_figure": 2, "track_studies": 1}
 """There are two studies, of one model."""
+NOISE = {"noise": 2, "noise_runs": 1, "contest_figure": 1, "track_contest": 1}
+"""Trainings on wrong labels from two seeds, on lines of their own."""
 BLACK_BOX = {"black_box": 1}
 LEARNED = {**TRAINED, **STUDIED, **BLACK_BOX}
 """What follows from other crops."""
@@ -107,13 +109,13 @@ def test_another_recipe_makes_one_synthetic_survey_anew(project):
 
 def test_another_emphasis_of_the_loss_trains_again_and_prepares_nothing(project):
     project.configure({"training.loss.alpha": 2.0})
-    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED}
+    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOISE}
 
 
 def test_swapping_the_values_of_two_settings_trains_again(project):
     """Snakemake compares parameters as a set, in which they would look the same."""
     project.configure({"training.loss": {"alpha": 0.1, "epsilon": 5.0}})
-    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED}
+    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOISE}
 
 
 def test_writing_a_default_down_changes_nothing(project):
@@ -129,7 +131,7 @@ def test_a_setting_of_one_stage_runs_that_stage_and_what_follows(project):
 
 def test_another_resolution_keeps_the_grids_there_are(project):
     project.configure({"voxels.resolution": 64})
-    assert project.planned() == {**SETTINGS, "voxels": 2, **LEARNED}
+    assert project.planned() == {**SETTINGS, "voxels": 2, **LEARNED, **NOISE}
     assert (project.results / "voxels/first/cube-32/manifest.json").exists()
 
 
@@ -167,7 +169,24 @@ def test_another_study_runs_itself_and_what_shows_it(project):
     project.configure({"studies": told})
     own = {"study": 1, "study_figure": 1, "track_studies": 1}
     shown = {"tables": 1, "report": 1, "mlflow_store": 1, "track": 1, "register": 1}
-    assert project.planned() == {**SETTINGS, **own, **shown}
+    assert project.planned() == {**SETTINGS, **own, **shown, "track_contest": 1}
+
+
+def test_another_share_of_wrong_labels_trains_on_these_alone(project):
+    project.configure({"noise.levels": [0, 0.3]})
+    assert project.planned() == {**SETTINGS, **NOISE, "tables": 1, "report": 1}
+
+
+def test_one_more_seed_of_wrong_labels_trains_only_that_seed(project):
+    project.configure({"noise.seeds": [0, 1, 2]})
+    assert project.planned() == {**SETTINGS, **NOISE, "noise": 1, "tables": 1, "report": 1}
+
+
+def test_cross_validation_is_one_job_a_model_and_reads_the_grids_there_are(project):
+    project.configure({"cross_validation": {"leave_out": 2}})
+    own = {"cross_validate": 3, "cross_validation_runs": 1, "contest_figure": 1}
+    logged = {"mlflow_store": 1, "track": 1, "track_studies": 1, "track_contest": 2, "register": 1}
+    assert project.planned() == {**SETTINGS, **own, **logged, "tables": 1, "report": 1}
 
 
 # Code
@@ -192,14 +211,14 @@ def test_editing_a_docstring_or_a_comment_runs_nothing(project):
 def test_editing_the_training_loop_trains_again_and_prepares_nothing(project):
     with (project.folder / "scenenet/training.py").open("a") as stream:
         stream.write("NOTHING = 0\n")
-    assert project.planned() == LEARNED
+    assert project.planned() == {**LEARNED, **NOISE}
 
 
 def test_a_new_kernel_trains_again(project):
     """All figures are drawn by one script, which knows the kernels."""
     kernels = project.folder / "scenenet/geneo/kernels"
     (kernels / "cone.py").write_text("# to come\nNOTHING = 0\n")
-    assert project.planned() == {**LEARNED, "tower_map": 2, "survey_map": 2}
+    assert project.planned() == {**LEARNED, **NOISE, "tower_map": 2, "survey_map": 2}
 
 
 def test_editing_the_report_writes_the_report_again(project):
@@ -255,7 +274,7 @@ def test_a_deleted_prediction_is_made_again(project):
 
 def test_a_deleted_mlflow_store_is_made_again_with_all_its_runs(project):
     (project.folder / "mlflow.db").unlink()
-    logged = {"track": 1, "track_studies": 1, "register": 1}
+    logged = {"track": 1, "track_studies": 1, "track_contest": 1, "register": 1}
     assert project.planned() == {"mlflow_store": 1, **logged, "report": 1}
 
 

@@ -20,7 +20,8 @@ STAGES = {
     *("train", "tune", "champion", "evaluate", "predict"),
     *("certificate", "timing"),
     *("study", "black_box", "tables", "figures", "scene"),
-    *("track", "track_studies", "register", "report"),
+    *("noise", "contest_runs"),
+    *("track", "track_studies", "track_contest", "register", "report"),
 }
 
 
@@ -102,11 +103,13 @@ def test_every_training_is_a_run_in_mlflow(finished):
         logged = read_json(finished.results / f"mlflow/study-{study}.json")["runs"]
         assert len(logged) == variants * (1 + 1)  # from one seed
         studied |= logged
+    noisy = read_json(finished.results / "mlflow/noise.json")["runs"]
+    assert len(noisy) == 2 * 4 * (1 + 2)  # levels; two models, the black box, the labels; seeds
     with sqlite3.connect(finished.folder / "mlflow.db") as store:
         (active,) = store.execute(
             "SELECT count(*) FROM runs WHERE lifecycle_stage = 'active'"
         ).fetchone()
-    assert active == len(runs) + len(studied)
+    assert active == len(runs) + len(studied) + len(noisy)
 
 
 def test_rules_leave_a_benchmark_and_a_log(finished):

@@ -10,9 +10,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
-from scenenet.geneo import ShapeParameter, kernel_named
-
 if TYPE_CHECKING:
+    from scenenet.geneo import ShapeParameter
     from scenenet.models import SceneNet
 
 Numbers = Mapping[str, float]
@@ -58,6 +57,9 @@ def parameters_of(model: SceneNet, voxel_size: float) -> list[Parameter]:
     Args:
         voxel_size: m, edge of the voxels that kernels in voxels were trained on.
     """
+    # Here, because who only wants to know which tables there are need not wait for torch.
+    from scenenet.geneo import kernel_named
+
     found = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         for parameter in kernel_named(geneo).parameters:
@@ -80,6 +82,9 @@ def sentences(
         values: of ``parameters_of``, by name, in metres.
         beside: what lengths are put beside.
     """
+    # Here, because who only wants to know which tables there are need not wait for torch.
+    from scenenet.geneo import kernel_named
+
     said = {}
     for name, geneo in zip(model.names, model.geneos, strict=True):
         kernel = kernel_named(geneo)

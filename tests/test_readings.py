@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import subprocess
+import sys
 
 import pytest
 import torch
@@ -105,3 +107,13 @@ def test_repeated_kernels_are_read_by_their_own_numbers():
     }
     said = sentences(model, values)
     assert lengths(said["cylinder_2.r"]) == [4.0]
+
+
+def test_names_of_tables_and_pictures_are_known_without_waiting_for_torch():
+    """The workflow asks for them whenever it is planned."""
+    asked = "import sys, scenenet.tables, scenenet.figures, scenenet.results"
+    heavy = "print([name for name in ('torch', 'matplotlib', 'numba') if name in sys.modules])"
+    done = subprocess.run(
+        [sys.executable, "-c", f"{asked}; {heavy}"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"

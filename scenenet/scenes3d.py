@@ -5,30 +5,42 @@ from __future__ import annotations
 
 import base64
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scenenet.files import write_json
 from scenenet.results import Results
 
+if TYPE_CHECKING:
+    from scenenet.detection import DetectionSettings
+
 CLASSES = ("other", "ground", "vegetation", "wire", "tower")
 """What a voxel shows, the later where it holds several."""
 
 
-def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dict[str, Any]:
+def write_scene(
+    results: Results,
+    model: str,
+    rank: str,
+    out: str | Path,
+    detection: DetectionSettings | None = None,
+) -> dict[str, Any]:
     """Write the best, median or worst test crop of a model for the page.
 
     Arrays are little-endian and in base64: ``zyx`` (M, 3) int16 voxels, ``class`` (M,) uint8 places
     in ``classes``, ``steps`` (M,) uint16 thresholds that the probability reaches, ``tower`` (M,)
     uint8 truth, and for a SCENE-Net ``shares`` by GENEO, (M,) int8 percent of the answer. ``true``
     and ``false`` are the counts of all voxels of the grid, empty ones included, that reach i of the
-    thresholds ``taus``, so that scores at any of them can be told without the grid.
+    thresholds ``taus``, so that scores at any of them can be told without the grid. ``whole`` (M,)
+    uint8 says which voxels are of whole towers found at the model's tau, ``whole_scores`` what that
+    is worth over the grid.
 
     Args:
         model: name of the model; its seed that is best on validation is shown.
         rank: best, median or worst, by F0.5 over the test crops.
         out: JSON file.
+        detection: what makes a tower; the default if None.
 
     Raises:
         InputError: the model has not been tuned and evaluated.
@@ -37,6 +49,8 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
 
     from scenenet.batches import batch
     from scenenet.convolution import convolve_at_voxels
+    from scenenet.detection import DetectionSettings
+    from scenenet.evaluation import find_in_crop
     from scenenet.figures.chosen import (
         champion_of,
         class_groups,
@@ -44,7 +58,7 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
         ranked,
         voxel_classes,
     )
-    from scenenet.metrics import THRESHOLDS, ThresholdCurve
+    from scenenet.metrics import THRESHOLDS, ThresholdCurve, confusion
     from scenenet.modelfile import read_model
     from scenenet.models import SceneNet
     from scenenet.training import probabilities
@@ -60,6 +74,9 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
     everywhere, truth = probabilities(trained, voxels, card.measurement)
     curve = ThresholdCurve.of(everywhere, truth)
     probability = everywhere[voxels.index]
+    tau = card.threshold()
+    _, whole_towers = find_in_crop(voxels, everywhere, tau, detection or DetectionSettings())
+    counts = confusion(voxels.spread(whole_towers)[0], truth, 0.5).scores()
     shares = {}
     if isinstance(trained, SceneNet):
         occupancy, _ = batch([voxels], card.measurement)
@@ -85,10 +102,12 @@ def write_scene(results: Results, model: str, rank: str, out: str | Path) -> dic
         "steps": _coded(np.searchsorted(taus, probability, side="right").astype("<u2")),
         "tower": _coded(voxels.tower.astype("<u1")),
         "shares": shares,
+        "whole": _coded(whole_towers.astype("<u1")),
+        "whole_scores": {name: counts[name] for name in ("precision", "recall", "f05")},
         "taus": [float(f"{tau:.6g}") for tau in THRESHOLDS],
         "true": curve.true.tolist(),
         "false": curve.false.tolist(),
-        "tau_step": int(np.argmin(np.abs(THRESHOLDS - card.threshold()))),
+        "tau_step": int(np.argmin(np.abs(THRESHOLDS - tau))),
     }
     write_json(out, scene)
     return scene

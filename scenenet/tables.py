@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
 TRIVIAL = "nothing detected"
 """Name of the trivial baseline, a model that never says tower, where others have theirs."""
+REACH_TAU, WHOLE_TOWERS = "reach tau", "of whole towers"
+"""Which voxels a model calls a tower's."""
 
 
 def classes(results: Results, thesis: Thesis) -> pd.DataFrame:
@@ -144,11 +146,12 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
     Up to three rows per model tell which trainings were counted: ``all seeds``, ``live seeds``
     (those that detect anything; only where some do not) and the one that is best on validation,
     which is the one that predicts. The thesis counts useful trainings only (5.2.6). The black box
-    (``scenenet.blackbox``) was trained, tuned and scored on the same crops.
+    (``scenenet.blackbox``) was trained, tuned and scored on the same crops. ``voxels`` says which
+    the model calls a tower's: those that reach tau, or those of whole towers (docs/towers.md).
     """
     import pandas as pd
 
-    columns = ["model", "counted", "n_seeds", "live_share", "parameters"]
+    columns = ["model", "counted", "voxels", "n_seeds", "live_share", "parameters"]
     columns += [f"{name}{part}" for name in SCORES for part in ("", "_std")]
     for name in ("precision", "recall", "miou"):
         columns += [f"thesis_{name}", f"thesis_{name}_std"]
@@ -159,6 +162,7 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
             row = {
                 "model": model,
                 "counted": counted,
+                "voxels": WHOLE_TOWERS if _says_towers(group) else REACH_TAU,
                 "n_seeds": len(group),
                 "live_share": sum(r.alive for r in trained) / len(trained),
                 "parameters": n_parameters(group[0]),
@@ -171,6 +175,7 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
         row = {
             "model": BLACK_BOX,
             "counted": "all seeds",
+            "voxels": REACH_TAU,
             "n_seeds": len(group),
             "live_share": sum(r.alive for r in group) / len(group),
             "parameters": round(sum(r.evaluation["parameters"] for r in group) / len(group)),
@@ -179,8 +184,34 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
     if results.trained:
         baseline = _mean_and_std(results.trained, "voxel_trivial", SCORES)
         scores = {name: baseline[name] for name in SCORES}
-        rows.append({"model": TRIVIAL, "counted": "-", "parameters": 0, **scores})
+        rows.append({"model": TRIVIAL, "counted": "-", "voxels": "-", "parameters": 0, **scores})
     return pd.DataFrame(rows, columns=columns).astype({"n_seeds": "Int64", "parameters": "Int64"})
+
+
+def whole_towers(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
+    """Scores of the voxels that reach tau beside those of whole towers that are found with them
+    (docs/towers.md): a row per model, mean and spread over all seeds, the black box among them."""
+    import pandas as pd
+
+    parts = {"tau": "voxel_observer", "towers": "voxel_towers"}
+    names = ("precision", "recall", "f05", "iou_tower")
+    columns = ["model", "n_seeds"]
+    columns += [f"{part}_{n}{end}" for part in parts for n in names for end in ("", "_std")]
+    groups = {model: results.of_model(model) for model in results.models}
+    rows = []
+    for model, group in (groups | {BLACK_BOX: results.black_box}).items():
+        if not group:
+            continue
+        row: dict[str, object] = {"model": model, "n_seeds": len(group)}
+        for part, of in parts.items():
+            found = _mean_and_std(group, of, names)
+            row |= {f"{part}_{name}": value for name, value in found.items()}
+        rows.append(row)
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _says_towers(group: list[SeedResult]) -> bool:
+    return bool(group[0].evaluation["whole_towers"])
 
 
 def tower_scores(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
@@ -205,6 +236,7 @@ TABLES: Mapping[str, Callable[[Results, Thesis], pd.DataFrame]] = {
     "voxelisation": voxelisation,
     "models": models,
     "seeds": seeds,
+    "whole_towers": whole_towers,
     "tower_scores": tower_scores,
     "times": times,
     "parameters": parameters,

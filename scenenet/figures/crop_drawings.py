@@ -5,9 +5,10 @@ Every function that draws writes one PNG and returns (alternative text, caption)
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -43,9 +44,17 @@ def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[s
     return side_views(cloud.xyz[keep], shown, out), (
         f"Crop {sample['id']}: the {rank} of {len(chosen_by.evaluation['per_sample'])} test crops "
         f"by F0.5 of {reference} (here {sample['f05']:.2f}, precision {sample['precision']:.2f}, "
-        f"recall {sample['recall']:.2f}). Points take the probability of their voxel; each model "
-        "is the seed that is best on validation. As thesis Figures 5.8 and 5.9."
+        f"recall {sample['recall']:.2f}{_counted(chosen_by, sample)}). Points take the probability "
+        "of their voxel; each model is the seed that is best on validation. As thesis Figures 5.8 "
+        "and 5.9."
     )
+
+
+def _counted(result: SeedResult, sample: Mapping[str, Any]) -> str:
+    """What the scores of a sample count, where it is not what reaches tau."""
+    if not result.evaluation["whole_towers"]:
+        return ""
+    return f", whole towers; of the voxels that reach tau F0.5 is {sample['f05_observer']:.2f}"
 
 
 def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]:

@@ -43,8 +43,13 @@ def _scenes(material: Material) -> list[Block]:
         if data is None:
             continue
         geneos = [(name, f"part of the {name.replace('_', ' ')}") for name in data["shares"]]
-        said = "what was found", "class", "probability"
-        colourings = [*zip(("found", "class", "probability"), said, strict=True), *geneos]
+        kinds = [
+            ("found", "what reaches tau"),
+            ("whole", "whole towers"),
+            ("class", "class"),
+            ("probability", "probability"),
+        ]
+        whole = data["whole_scores"]
         n = len(data["true"])
         made.append(
             Scene(
@@ -52,11 +57,13 @@ def _scenes(material: Material) -> list[Block]:
                 f"The {rank} test crop, to be turned",
                 f"Crop {data['crop']} in voxels of {data['voxel_size']:.2f} m, as {data['model']} "
                 f"(seed {data['seed']}) answers it. Drag to turn it, or use the arrow keys, + and "
-                "-. Found: green is right, orange is no tower, pink was missed. A part is red "
-                "where an operator adds to the answer and blue where it takes away. The scores "
-                f"count all voxels of the grid; the slider has {n - 1} thresholds.",
+                "-. What is found: green is right, orange is no tower, pink was missed. A part is "
+                "red where an operator adds to the answer and blue where it takes away. The scores "
+                f"count all voxels of the grid; the slider has {n - 1} thresholds. Whole towers, "
+                f"found at the model's tau: precision {whole['precision']:.3f}, recall "
+                f"{whole['recall']:.3f}, F0.5 {whole['f05']:.3f}.",
                 f"The occupied voxels of crop {data['crop']} in space.",
-                colourings,
+                [*kinds, *geneos],
                 data,
             )
         )

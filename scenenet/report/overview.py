@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from scenenet.report.blocks import Block, Facts, Section, Text, write
 from scenenet.report.material import Material
 from scenenet.results import BLACK_BOX
-from scenenet.tables import TRIVIAL
+from scenenet.tables import TRIVIAL, WHOLE_TOWERS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,12 +52,13 @@ def overview(material: Material) -> Section:
 
 def _headline(material: Material, models: pd.DataFrame, first: Mapping[Any, Any]) -> str:
     n_crops = material.results.of_model(first["model"])[0].evaluation["voxel"]["n_samples"]
+    trivial = models.loc[models["model"] == TRIVIAL, "miou"].iloc[0]
     return (
         f"Scores are of {n_crops} test crops that no model was trained or tuned on. "
         f"{first['model']} ({first['counted']}), {_what(material, first)}, is the model that "
         f"predicts. It reaches a precision of {first['precision']:.2f} at a recall of "
-        f"{first['recall']:.2f} over the voxels of towers. A model that never says tower has a "
-        f"mean IoU of {models.loc[models['model'] == TRIVIAL, 'miou'].iloc[0]:.2f}, because the "
+        f"{first['recall']:.2f} over the voxels of towers{_decision(first)}. A model that never "
+        f"says tower has a mean IoU of {trivial:.2f}, because the "
         "mean is over background and tower; the IoU of the tower alone stands beside it "
         "everywhere."
     )
@@ -74,8 +75,16 @@ def _compared(material: Material, other: Mapping[Any, Any], first: Mapping[Any, 
         beside = f"{abs(apart):.2f} {'better' if apart > 0 else 'worse'} than {first['model']}"
     return (
         f"{who} reaches a precision of {other['precision']:.2f} at a recall of "
-        f"{other['recall']:.2f}; with an F0.5 of {other['f05']:.2f} it is {beside}."
+        f"{other['recall']:.2f}{_decision(other)}; with an F0.5 of {other['f05']:.2f} it is "
+        f"{beside}."
     )
+
+
+def _decision(row: Mapping[Any, Any]) -> str:
+    """Which voxels were counted."""
+    if row["voxels"] == WHOLE_TOWERS:
+        return " (those of the whole towers that are found)"
+    return " (those that reach tau)"
 
 
 def _speaking(models: pd.DataFrame, name: str) -> Mapping[Any, Any]:

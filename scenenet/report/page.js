@@ -53,6 +53,7 @@ class Scene {
     this.classes = unpack(data.class, Uint8Array);
     this.steps = unpack(data.steps, Uint16Array);
     this.tower = unpack(data.tower, Uint8Array);
+    this.whole = unpack(data.whole, Uint8Array);
     this.shares = Object.fromEntries(
       Object.entries(data.shares).map(([name, text]) => [name, unpack(text, Int8Array)]));
     this.n = this.tower.length;
@@ -113,9 +114,10 @@ class Scene {
       return (i) => named[this.classes[i]];
     }
     if (what === "probability") return (i) => mix([200, 206, 212], [214, 39, 40], Math.min(1, this.steps[i] / n));
-    if (what === "found") {
+    if (what === "found" || what === "whole") {
+      const said = what === "whole" ? (i) => this.whole[i] : (i) => this.steps[i] > step;
       return (i) => {
-        if (this.steps[i] > step) return this.tower[i] ? FOUND_COLOURS.right : FOUND_COLOURS.wrong;
+        if (said(i)) return this.tower[i] ? FOUND_COLOURS.right : FOUND_COLOURS.wrong;
         return this.tower[i] ? FOUND_COLOURS.missed : FOUND_COLOURS.nothing;
       };
     }

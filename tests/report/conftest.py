@@ -140,6 +140,7 @@ def _write_training(folder: Path, model: str, seed: int) -> None:
     write_json(folder / "evaluate" / model / f"seed-{seed}.json", {
         "model": model, "seed": seed, "alive": not dead, "voxel": scores | shared,
         "voxel_trivial": trivial | shared, "voxel_occupied": scores | shared,
+        "voxel_observer": scores | shared, "voxel_towers": scores | shared, "whole_towers": False,
         "towers": {"precision": 1.0, "recall": 0.5, "median_error_m": None if dead else 1.5,
                    "n_true": 3, "n_predicted": 2},
         "per_sample": per_sample, "pr_curve": curve, "average_precision": precision * recall,

@@ -126,7 +126,7 @@ def test_each_colouring_is_another_picture(pictures, page, scene):
     with opened(pictures, page) as tab:
         select, canvas = (tab.locator(f"figure.scene {one}") for one in ("select", "canvas"))
         colours = select.evaluate("select => [...select.options].map(option => option.value)")
-        assert colours[:3] == ["found", "class", "probability"]
+        assert colours[:4] == ["found", "whole", "class", "probability"]
         drawn = set()
         for colour in colours:
             select.select_option(colour)

@@ -45,3 +45,11 @@ def test_the_counts_are_those_of_the_whole_grid(scene):
     np.testing.assert_array_equal(np.bincount(steps[tower], minlength=651), curve.true)
     assert (np.bincount(steps[~tower], minlength=651)[1:] <= curve.false[1:]).all()
     assert len(scene["taus"]) == len(THRESHOLDS)
+
+
+def test_whole_towers_score_what_their_voxels_say(scene):
+    tower, whole = (decoded(scene[name], "<u1") > 0 for name in ("tower", "whole"))
+    tp, fp = (whole & tower).sum(), (whole & ~tower).sum()
+    assert whole.any()
+    assert scene["whole_scores"]["precision"] == pytest.approx(tp / (tp + fp))
+    assert scene["whole_scores"]["recall"] == pytest.approx(tp / tower.sum())

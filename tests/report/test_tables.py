@@ -7,6 +7,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -225,3 +226,24 @@ def test_the_black_box_stands_beside_the_models(results: Results, thesis: Thesis
     found = row(tables.models(results, thesis), model="black box")
     assert found["precision"] == pytest.approx(0.8)
     assert (found["parameters"], found["n_seeds"]) == (1000, 2)
+
+
+def test_both_ways_to_count_stand_beside_each_other(results: Results, thesis: Thesis):
+    for seed in results.seeds:
+        path = results.folder / "evaluate" / "scenenet" / f"seed-{seed}.json"
+        told = json.loads(path.read_text())
+        told["voxel_towers"] = {**told["voxel_towers"], "f05": 0.5 + 0.1 * seed}
+        told["whole_towers"] = True
+        told["voxel"] = told["voxel_towers"]
+        path.write_text(json.dumps(told))
+    fresh = replace(results)
+    table = tables.whole_towers(fresh).set_index("model")
+    expected = np.mean([0.5 + 0.1 * seed for seed in results.seeds])
+    assert table.loc["scenenet", "towers_f05"] == pytest.approx(expected)
+    seeds = tables.seeds(fresh)
+    by_observer = [r.evaluation["voxel_observer"]["f05"] for r in fresh.of_model("scenenet")]
+    assert table.loc["scenenet", "tau_f05"] == pytest.approx(np.mean(by_observer))
+    models = tables.models(fresh, thesis).set_index("model")
+    assert set(models.loc["scenenet", "voxels"]) == {tables.WHOLE_TOWERS}
+    assert set(np.atleast_1d(models.loc["cnn", "voxels"])) == {tables.REACH_TAU}
+    assert seeds[seeds["model"] == "scenenet"]["f05"].mean() == pytest.approx(expected)

@@ -231,7 +231,7 @@ rule scene:
     params:
         job=lambda w: job(
             "scene",
-            {},
+            SETTINGS["detection"],
             results=gathered(models=[settings.model_named(settings.predict.model)]),
             model=settings.predict.model,
             rank=w.rank,

@@ -24,6 +24,7 @@ CATEGORIES = {
 TABLE_TITLES = {
     "models": ("Scores of each model", "models"),
     "seeds": ("Scores of each seed", "models"),
+    "whole_towers": ("Voxels that reach tau, and whole towers", "models"),
     "tower_scores": ("Towers found", "models"),
     "times": ("Times", "models"),
     "parameters": ("Learned numbers in metres", "learned"),

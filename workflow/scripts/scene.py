@@ -5,9 +5,16 @@ from gathered import results_of
 
 
 def scene(job: adapter.Job) -> None:
+    from scenenet.detection import DetectionSettings
     from scenenet.scenes3d import write_scene
 
-    write_scene(results_of(job), job.identity["model"], job.identity["rank"], job.output.scene)
+    write_scene(
+        results_of(job),
+        job.identity["model"],
+        job.identity["rank"],
+        job.output.scene,
+        DetectionSettings(**job.settings),
+    )
 
 
 adapter.run(scene)

@@ -150,7 +150,7 @@ def take_runs(store: Tracked, out: Path) -> None:
         page.get_by_role("checkbox").first.check(force=True)
         page.get_by_role("button", name="Compare").wait_for()
         save(page.screenshot(), out / "mlflow-runs.png")
-    with browsing(height=1000) as page:
+    with browsing(height=800) as page:
         open_comparison(page, store, variants)
         save(page.screenshot(), out / "mlflow-compare.png")
 
@@ -158,10 +158,11 @@ def take_runs(store: Tracked, out: Path) -> None:
 def take_seeds(store: Tracked, out: Path) -> None:
     """The seeds of a SCENE-Net: their scores, and the path of one number."""
     seeds = store.runs(filter_string="tags.model = 'scenenet' and tags.seed != ''")
-    with browsing(height=1000) as page:
+    with browsing(height=760) as page:
         open_comparison(page, store, seeds)
-        page.get_by_text("Metrics", exact=True).last.scroll_into_view_if_needed()
-        page.get_by_text("test_f05", exact=True).first.scroll_into_view_if_needed()
+        for section in ("Visualizations", "Run details", "Parameters"):
+            page.get_by_role("button", name=section, exact=True).click()
+        scroll_to_metric(page, "test_average_precision")
         save(page.screenshot(), out / "mlflow-seeds.png")
     ids = [run.info.run_id for run in seeds]
     with browsing(height=760) as page:
@@ -186,6 +187,34 @@ def open_comparison(page: Page, store: Tracked, runs: Sequence[Run]) -> None:
     page.get_by_text(f"Comparing {len(runs)} Runs").wait_for()
     page.get_by_text(str(runs[0].info.run_name), exact=True).first.wait_for()
     page.locator(".js-plotly-plot svg").first.wait_for(state="attached")
+
+
+def scroll_to_metric(page: Page, name: str) -> None:
+    """Bring a metric to the top of the table of a comparison, which draws what is scrolled to."""
+    table = page.get_by_role("grid").last
+    table.wait_for()
+    page.wait_for_function(
+        """async ([name]) => {
+          const table = [...document.querySelectorAll("[role=grid]")].pop();
+          for (let top = 0; top < table.scrollHeight; top += 100) {
+            table.scrollTop = top;
+            await new Promise((done) => setTimeout(done, 50));
+            const row = [...document.querySelectorAll("[role=grid] a")]
+              .find((link) => link.textContent.trim() === name);
+            if (!row) continue;
+            // The names lie in a table of their own, which follows a moment later.
+            const names = [...document.querySelectorAll("[role=grid]")].at(-2);
+            const place = parseFloat(row.parentElement.style.top);
+            for (let attempt = 0; attempt < 40; attempt++) {
+              table.scrollTop = place + attempt % 2;
+              await new Promise((done) => setTimeout(done, 50));
+              if (attempt % 2 === 0 && names.scrollTop === table.scrollTop) return true;
+            }
+          }
+          return false;
+        }""",
+        arg=[name],
+    )
 
 
 def _columns(experiment: str, runs: Sequence[Run]) -> dict[str, str]:

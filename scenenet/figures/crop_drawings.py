@@ -107,7 +107,7 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         f"what is labelled tower, what {model} (seed {champion.seed}) answers, and where that is "
         "right at its tau: green is right, orange is no tower, pink was missed. It was trained "
         f"on voxels of {card.voxel_size:.2f} m alone; its kernels are {trained_on}. At the same "
-        f"tau of {card.threshold():.3f} it has {' and '.join(said)} of the voxels. "
+        f"tau of {card.threshold():.3f} it has {' and '.join(said)} of the voxels that reach tau. "
         "As thesis Figure 5.10."
     )
 

@@ -1,7 +1,7 @@
 """The tables of thesis chapter 5 from result files, the thesis' numbers beside ours.
 
-Every function returns a data frame for one CSV. A table for which a run has left nothing (TS40K
-samples have no survey to check) keeps its columns and has no rows. Spread is always the sample
+Every function returns a data frame for one CSV. A table for which a run has left nothing (no
+survey was checked) keeps its columns and has no rows. Spread is always the sample
 standard deviation over seeds, empty for a single seed.
 """
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from scenenet import tables
 from scenenet.files import atomic
 from scenenet.published import Published, Thesis
-from scenenet.results import Results
+from scenenet.results import Results, SeedResult
 from scenenet.studies.findings import as_good_as_best
 from scenenet.studies.settings import StudySettings
 from scenenet.studies.summary import summarise
@@ -36,7 +36,9 @@ REMARKS: Mapping[str, str] = {
     "voxelisation.": "Time on the machine this ran on; counted without sorting.",
     "protocol.epochs_needed": "The fewest epochs whose F0.5 is not told apart from the best one's; "
     "an epoch has fewer steps here.",
-    "protocol.": "A setting, and not a result; see the settings of the run.",
+    "protocol.crops_needed": "The fewest training crops whose F0.5 is not told apart from the best "
+    "one's, of those there are.",
+    "protocol.": "A setting, and not a result: chosen for other and fewer crops.",
     "parameters.": "Weights of runs are comparable only as far as the kernels' values are.",
     "models.": "Other and fewer crops than the thesis had.",
     "times.": "Time on the machine this ran on, with other and fewer crops.",
@@ -113,7 +115,7 @@ def _remark(name: str) -> str:
 def _ours(results: Results, thesis: Thesis) -> dict[str, float | None]:
     """Our number for each name that this run has one for."""
     found: dict[str, float | None] = {}
-    for gather in (_of_data, _of_models, _of_times, _of_studies):
+    for gather in (_of_data, _of_settings, _of_models, _of_times, _of_studies):
         found |= gather(results, thesis)
     return found
 
@@ -130,7 +132,45 @@ def _of_data(results: Results, thesis: Thesis) -> dict[str, float | None]:
     for row in tables.voxelisation(results, thesis).to_dict("records"):
         found[f"voxelisation.{str(row['grid']).removeprefix('cube-')}"] = row["seconds"]
         found["data.crops"] = row["samples"]
+    split = results.split()
+    if split is not None:
+        for part in ("train", "validation", "test"):
+            found[f"protocol.{part}_share"] = 100 * float((split["part"] == part).mean())
     return found
+
+
+SETTINGS: Mapping[str, str] = {
+    "batch_size": "training.batch_size",
+    "epochs": "training.epochs",
+    "learning_rate": "training.learning_rate",
+    "alpha": "training.loss.alpha",
+    "epsilon": "training.loss.epsilon",
+    "rho_l": "training.loss.rho_mixing",
+    "rho_t": "training.loss.rho_shape",
+}
+"""Published settings -> ours, of the model that speaks for SCENE-Net."""
+
+
+def _of_settings(results: Results, thesis: Thesis) -> dict[str, float | None]:
+    name = _first(results, "scenenet")
+    trained = [] if name is None else results.of_model(name)
+    settings = _settings(trained[0]) if trained else {}
+    found: dict[str, float | None] = {}
+    for ours, dotted in SETTINGS.items():
+        value: Any = settings
+        for step in dotted.split("."):
+            value = value.get(step) if isinstance(value, Mapping) else None
+        found[f"protocol.{ours}"] = value
+    found["protocol.kernel_side"] = (settings.get("kernel_size") or [None])[0]
+    errors = [r.history["fidelity"] for r in trained if r.history is not None]
+    if errors:
+        found["loss.range"] = float(sum(e.mean() for e in errors) / len(errors))
+    return found
+
+
+def _settings(trained: SeedResult) -> Mapping[str, Any]:
+    """What a model was trained with, as far as its provenance says."""
+    return (trained.provenance or {}).get("settings") or {}
 
 
 def _of_models(results: Results, thesis: Thesis) -> dict[str, float | None]:
@@ -169,13 +209,15 @@ def _of_times(results: Results, thesis: Thesis) -> dict[str, float | None]:
     times = tables.times(results, thesis)
     if times.empty:
         return {}
-    minutes = float(times["training_seconds"].iloc[0]) / 60
-    found: dict[str, float | None] = {"times.training": minutes, "times.training_bound": minutes}
+    found: dict[str, float | None] = {}
     for kind in ("scenenet", "cnn"):
         rows = times[times["model"] == _first(results, kind)]
         if rows.empty:
             continue
         row = rows.iloc[0]
+        if kind == "scenenet":
+            minutes = float(row["training_seconds"]) / 60
+            found |= {"times.training": minutes, "times.training_bound": minutes}
         found[f"times.{kind}.inference"] = float(row["inference_ms"])
         found[f"times.{kind}.training_useful"] = float(row["useful_seconds"]) / 3600
     ours, theirs = (found.get(f"times.{kind}.inference") for kind in ("scenenet", "cnn"))
@@ -185,8 +227,13 @@ def _of_times(results: Results, thesis: Thesis) -> dict[str, float | None]:
 
 
 def _first(results: Results, kind: str) -> str | None:
-    """The first model of an architecture."""
-    return next((model for model, k in results.models.items() if k == kind), None)
+    """The first model of an architecture, one of the thesis' protocol if there is one."""
+    names = [model for model, k in results.models.items() if k == kind]
+    for name in names:
+        trained = results.of_model(name)
+        if trained and _settings(trained[0]).get("protocol", "thesis") == "thesis":
+            return name
+    return names[0] if names else None
 
 
 def _of_studies(results: Results, thesis: Thesis) -> dict[str, float | None]:
@@ -207,6 +254,9 @@ def _of_studies(results: Results, thesis: Thesis) -> dict[str, float | None]:
         if study.name == "epochs":
             enough = summary.index[as_good_as_best(summary)]
             found["protocol.epochs_needed"] = min(_epochs(study, name) for name in enough)
+        if study.name == "split":
+            enough = summary.index[as_good_as_best(summary)]
+            found["protocol.crops_needed"] = float(summary.loc[enough, "training_crops"].min())
         if study.name == "measurement":
             presence, density = (float(value) for value in summary["f05"].iloc[:2])
             if density:

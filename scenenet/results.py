@@ -204,12 +204,15 @@ class Results:
         """The labelled towers of each survey, one row per tower."""
         return self._each(self.surveys, "towers", "towers.csv", read_table)
 
-    def voxel_manifests(self) -> dict[str, dict[str, Mapping[str, Any]]]:
-        """The manifests: grid (such as ``cube-64``) -> survey -> manifest."""
-        grids: dict[str, dict[str, Mapping[str, Any]]] = {}
-        for path in sorted((self.folder / "voxels").glob("*/*/manifest.json")):
-            grids.setdefault(path.parent.name, {})[path.parent.parent.name] = read_result(path)
-        return grids
+    def grid_times(self) -> pd.DataFrame | None:
+        """Time and size of every crop on the grids of the thesis (``scenenet.grid_times``)."""
+        path = self.folder / "times" / "grids.csv"
+        return read_table(path) if path.exists() else None
+
+    def split(self) -> pd.DataFrame | None:
+        """The part of each crop (``scenenet.split``)."""
+        path = self.folder / "split" / "split.csv"
+        return read_table(path) if path.exists() else None
 
     def prediction(self, survey: str) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
         """Summary and tower list (GeoJSON) of a classified survey; None if it was not classified.

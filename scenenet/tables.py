@@ -91,23 +91,20 @@ def voxelisation(results: Results, thesis: Thesis) -> pd.DataFrame:
 
     columns = ["grid", "samples", "seconds", "seconds_std", "occupied_voxels", "tower_voxels",
                "tower_share_percent", "thesis_seconds"]  # fmt: skip
+    timed = results.grid_times()
     rows = []
-    for grid, manifests in results.voxel_manifests().items():
-        samples = pd.DataFrame([s for m in manifests.values() for s in m["samples"]])
-        if samples.empty:
-            continue
-        occupied, tower = samples["occupied"], samples["tower"]
-        cube_side = grid.removeprefix("cube-")
+    for grid, crops in () if timed is None else timed.groupby("grid", sort=False):
+        occupied, tower = crops["occupied"], crops["tower"]
         rows.append(
             (
                 grid,
-                len(samples),
-                samples["seconds"].mean(),
-                samples["seconds"].std(),
+                len(crops),
+                crops["seconds"].mean(),
+                crops["seconds"].std(),
                 occupied.mean(),
                 tower.mean(),
                 100 * tower.sum() / occupied.sum(),
-                thesis.value(f"voxelisation.{cube_side}"),
+                thesis.value(f"voxelisation.{str(grid).removeprefix('cube-')}"),
             )
         )
     return pd.DataFrame(rows, columns=columns)

@@ -57,7 +57,7 @@ def _headline(material: Material, models: pd.DataFrame, first: Mapping[Any, Any]
         f"Scores are of {n_crops} test crops that no model was trained or tuned on. "
         f"{first['model']} ({first['counted']}), {_what(material, first)}, is the model that "
         f"predicts. It reaches a precision of {first['precision']:.2f} at a recall of "
-        f"{first['recall']:.2f} over the voxels of towers{_decision(first)}. A model that never "
+        f"{first['recall']:.2f} over {_decision(first)}. A model that never "
         f"says tower has a mean IoU of {trivial:.2f}, because the "
         "mean is over background and tower; the IoU of the tower alone stands beside it "
         "everywhere."
@@ -75,16 +75,30 @@ def _compared(material: Material, other: Mapping[Any, Any], first: Mapping[Any, 
         beside = f"{abs(apart):.2f} {'better' if apart > 0 else 'worse'} than {first['model']}"
     return (
         f"{who} reaches a precision of {other['precision']:.2f} at a recall of "
-        f"{other['recall']:.2f}{_decision(other)}; with an F0.5 of {other['f05']:.2f} it is "
-        f"{beside}."
+        f"{other['recall']:.2f} over {_decision(other)}; with an F0.5 of {other['f05']:.2f} it is "
+        f"{beside}.{_alike(material, other, first)}"
     )
 
 
 def _decision(row: Mapping[Any, Any]) -> str:
     """Which voxels were counted."""
     if row["voxels"] == WHOLE_TOWERS:
-        return " (those of the whole towers that are found)"
-    return " (those that reach tau)"
+        return "the voxels of the whole towers it finds"
+    return "the voxels that reach its tau"
+
+
+def _alike(material: Material, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
+    """The same two models with the same voxels counted, where theirs are not."""
+    frame = material.table("whole_towers")
+    if other["voxels"] == first["voxels"] or frame is None:
+        return ""
+    f05 = frame.set_index("model")
+    said = [
+        f"{f05.loc[other['model'], f'{part}_f05']:.2f} against "
+        f"{f05.loc[first['model'], f'{part}_f05']:.2f} {of}"
+        for part, of in (("towers", "of whole towers"), ("tau", "of voxels that reach tau"))
+    ]
+    return f" Counted alike, mean over all seeds, it has {' and '.join(said)}."
 
 
 def _speaking(models: pd.DataFrame, name: str) -> Mapping[Any, Any]:

@@ -118,9 +118,12 @@ def _write_survey(folder: Path) -> None:
             xyz, codes = tower_crop(number)
             writer.add(name, {"xyz": xyz, "classification": codes})
             facts["crops"].append({"id": name, "points": len(xyz)})
-    samples = [{"id": name, "occupied": 4000, "tower": 100, "seconds": seconds}
-               for name, seconds in zip(CROPS, (0.1, 0.2, 0.3), strict=True)]  # fmt: skip
-    write_json(folder / "voxels" / "north" / "cube-64" / "manifest.json", {"samples": samples})
+    times = [
+        {"grid": grid, "crop": name, "seconds": seconds, "occupied": 4000, "tower": 100}
+        for grid in ("cube-32", "cube-64", "cube-128")
+        for name, seconds in zip(CROPS, (0.1, 0.2, 0.3), strict=True)
+    ]
+    write_csv(folder / "times" / "grids.csv", times)
     split = [{"survey": "north", "crop": name, "stretch": 0, "part": "test"} for name in CROPS]
     write_csv(folder / "split" / "split.csv", split)
 

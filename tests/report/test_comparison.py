@@ -121,3 +121,37 @@ def test_what_studies_say_by_themselves_stands_beside_the_thesis(results: Result
     assert row(frame, "starts.cnn.alive_share")["verdict"] == "better"
     assert row(frame, "protocol.epochs_needed")["ours"] == 25
     assert row(frame, "protocol.epochs_needed")["verdict"] == "not"
+
+
+def test_settings_of_the_thesis_stand_beside_those_of_its_protocol(
+    results: Results, thesis: Thesis
+):
+    settings = {
+        "protocol": "thesis",
+        "kernel_size": [9, 5, 5],
+        "training": {"epochs": 50, "loss": {"alpha": 3.0, "rho_mixing": 5.0}},
+    }
+    for seed in results.seeds:
+        path = results.folder / "train" / "scenenet" / f"seed-{seed}" / "provenance.json"
+        path.write_text(json.dumps(json.loads(path.read_text()) | {"settings": settings}))
+    frame = compare(replace(results), thesis)
+    assert row(frame, "protocol.epochs")["verdict"] == "reproduced"
+    assert (row(frame, "protocol.alpha")["ours"], row(frame, "protocol.alpha")["verdict"]) == (
+        3.0,
+        "not",
+    )
+    assert row(frame, "protocol.kernel_side")["ours"] == 9
+    assert row(frame, "protocol.rho_l")["verdict"] == "reproduced"
+    assert row(frame, "protocol.rho_t")["verdict"] == "not measured"
+    assert row(frame, "protocol.test_share")["ours"] == 100
+
+
+def test_the_thesis_is_compared_with_a_model_of_its_protocol(results: Results, thesis: Thesis):
+    """One in metres may come first in the configuration."""
+    for model, protocol in (("scenenet", "field"), ("cnn", "thesis")):
+        for seed in results.seeds:
+            path = results.folder / "train" / model / f"seed-{seed}" / "provenance.json"
+            told = json.loads(path.read_text()) | {"settings": {"protocol": protocol}}
+            path.write_text(json.dumps(told))
+    both = replace(results, models={"scenenet": "scenenet", "cnn": "scenenet"})
+    assert row(compare(both, thesis), "models.scenenet.precision")["ours"] == pytest.approx(0.2)

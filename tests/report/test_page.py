@@ -12,13 +12,14 @@ import pytest
 
 from scenenet.errors import InputError
 from scenenet.figures import draw_all, plan
+from scenenet.files import read_json, write_json
 from scenenet.published import Thesis
 from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
 from scenenet.results import Results
 from scenenet.studies.run import COLUMNS
 from scenenet.studies.settings import StudySettings
-from scenenet.tables import write_tables
+from scenenet.tables import whole_towers, write_tables
 
 VOID = {"meta", "img", "br", "hr", "link"}
 
@@ -216,3 +217,22 @@ def test_a_picture_that_is_none_is_named(page: Path, results: Results, thesis: T
 )
 def test_values_are_written_as_people_read_them(value, how, text):
     assert write(value, how) == text
+
+
+def test_models_that_count_other_voxels_are_compared_alike_as_well(
+    results: Results, thesis: Thesis, tmp_path: Path
+):
+    for seed in results.seeds:
+        path = results.folder / "evaluate" / "scenenet" / f"seed-{seed}.json"
+        told = read_json(path)
+        told |= {"whole_towers": True, "voxel_towers": {**told["voxel"], "f05": 0.9}}
+        write_json(path, told | {"voxel": told["voxel_towers"]})
+    fresh = replace(results)
+    write_tables(fresh, thesis, fresh.folder / "tables")
+    out = tmp_path / "index.html"
+    write_report(fresh, thesis, out)
+    text = " ".join(read(out).text.split())
+    assert "over the voxels of the whole towers it finds" in text
+    table = whole_towers(fresh).set_index("model")
+    cnn = f"{table.loc['cnn', 'towers_f05']:.2f} against 0.90 of whole towers"
+    assert f"Counted alike, mean over all seeds, it has {cnn}" in text

@@ -102,3 +102,26 @@ rule split:
         "Sharing the crops out to training, validation and test"
     script:
         "../scripts/split.py"
+
+
+rule grid_times:
+    input:
+        stores=CROP_STORES,
+        manifests=CROP_MANIFESTS,
+    output:
+        times=f"{R}/times/grids.csv",
+        provenance=f"{R}/times/grids.provenance.json",
+    log:
+        f"{R}/logs/grid_times.log",
+    benchmark:
+        f"{R}/benchmarks/grid_times.tsv"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=60,
+    params:
+        job=job("grid_times", {}),
+    message:
+        "Timing how crops become voxels"
+    script:
+        "../scripts/grid_times.py"

@@ -124,6 +124,7 @@ RECORDS = [
     *expand(f"{R}/{{stage}}/{{survey}}/provenance.json", stage=["towers", "crops"], survey=TRAIN),
     *expand(f"{R}/voxels/{{survey}}/{GRID}/provenance.json", survey=TRAIN),
     f"{R}/split/provenance.json",
+    f"{R}/times/grids.provenance.json",
     *each_training(f"{R}/train/{{model}}/seed-{{seed}}/provenance.json"),
     *each_training(f"{R}/tune/{{model}}/seed-{{seed}}.provenance.json"),
     *each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.provenance.json"),

@@ -24,7 +24,8 @@ rule tables:
     input:
         checks=CLASS_COUNTS,
         towers=expand(f"{R}/towers/{{survey}}/towers.csv", survey=TRAIN),
-        grids=VOXEL_MANIFESTS,
+        grids=f"{R}/times/grids.csv",
+        split=f"{R}/split/split.csv",
         trainings=TRAININGS,
         resources=RESOURCES,
         tunings=TUNINGS,

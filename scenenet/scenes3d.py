@@ -14,6 +14,9 @@ from scenenet.results import Results
 
 if TYPE_CHECKING:
     from scenenet.detection import DetectionSettings
+    from scenenet.models import VoxelModel
+    from scenenet.protocol import Measurement
+    from scenenet.voxels import VoxelSample
 
 CLASSES = ("other", "ground", "vegetation", "wire", "tower")
 """What a voxel shows, the later where it holds several."""
@@ -45,10 +48,6 @@ def write_scene(
     Raises:
         InputError: the model has not been tuned and evaluated.
     """
-    import torch
-
-    from scenenet.batches import batch
-    from scenenet.convolution import convolve_at_voxels
     from scenenet.detection import DetectionSettings
     from scenenet.evaluation import find_in_crop
     from scenenet.figures.chosen import (
@@ -60,7 +59,6 @@ def write_scene(
     )
     from scenenet.metrics import THRESHOLDS, ThresholdCurve, confusion
     from scenenet.modelfile import read_model
-    from scenenet.models import SceneNet
     from scenenet.training import probabilities
     from scenenet.voxels import VoxelSettings, voxelise
 
@@ -70,26 +68,14 @@ def write_scene(
     trained, card = read_model(champion.model_files[0])
     settings = VoxelSettings(fit=card.fit, resolution=card.resolution, voxel_size=card.voxel_size)
     voxels = voxelise(cloud, settings.grid(cloud.xyz), sample["id"])
-    trained = trained.at(voxels.grid.voxel_size)
     everywhere, truth = probabilities(trained, voxels, card.measurement)
     curve = ThresholdCurve.of(everywhere, truth)
-    probability = everywhere[voxels.index]
-    tau = card.threshold()
-    _, whole_towers = find_in_crop(voxels, everywhere, tau, detection or DetectionSettings())
-    counts = confusion(voxels.spread(whole_towers)[0], truth, 0.5).scores()
-    shares = {}
-    if isinstance(trained, SceneNet):
-        occupancy, _ = batch([voxels], card.measurement)
-        with torch.no_grad():
-            answers = convolve_at_voxels(occupancy, trained.weighted_kernels())
-            parts = answers[:, trained.speakers(occupancy, answers.sum(dim=0))].numpy()
-        whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
-        percent = np.rint(100 * parts / whole).astype("<i1")
-        shares = {name: _coded(row) for name, row in zip(trained.names, percent, strict=True)}
+    probability, tau = everywhere[voxels.index], card.threshold()
+    _, whole = find_in_crop(voxels, everywhere, tau, detection or DetectionSettings())
+    counts = confusion(voxels.spread(whole)[0], truth, 0.5).scores()
     taus = THRESHOLDS.astype(probability.dtype)
     zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
     names = voxel_classes(class_groups(cloud), voxels.grid.voxel_of(cloud.xyz), voxels.index)
-    classes = np.array([CLASSES.index(name) for name in names], np.uint8)
     scene = {
         "crop": sample["id"],
         "rank": rank,
@@ -98,11 +84,11 @@ def write_scene(
         "voxel_size": voxels.grid.voxel_size,
         "classes": CLASSES,
         "zyx": _coded(zyx.astype("<i2")),
-        "class": _coded(classes),
+        "class": _coded(np.array([CLASSES.index(name) for name in names], np.uint8)),
         "steps": _coded(np.searchsorted(taus, probability, side="right").astype("<u2")),
         "tower": _coded(voxels.tower.astype("<u1")),
-        "shares": shares,
-        "whole": _coded(whole_towers.astype("<u1")),
+        "shares": _shares(trained, voxels, card.measurement),
+        "whole": _coded(whole.astype("<u1")),
         "whole_scores": {name: counts[name] for name in ("precision", "recall", "f05")},
         "taus": [float(f"{tau:.6g}") for tau in THRESHOLDS],
         "true": curve.true.tolist(),
@@ -111,6 +97,26 @@ def write_scene(
     }
     write_json(out, scene)
     return scene
+
+
+def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) -> dict[str, str]:
+    """The part of each GENEO in the answer to each occupied voxel, coded; none for a CNN."""
+    import torch
+
+    from scenenet.batches import batch
+    from scenenet.convolution import convolve_at_voxels
+    from scenenet.models import SceneNet
+
+    if not isinstance(model, SceneNet):
+        return {}
+    model = model.at(voxels.grid.voxel_size)
+    occupancy, _ = batch([voxels], measurement)
+    with torch.no_grad():
+        answers = convolve_at_voxels(occupancy, model.weighted_kernels())
+        parts = answers[:, model.speakers(occupancy, answers.sum(dim=0))].numpy()
+    whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
+    percent = np.rint(100 * parts / whole).astype("<i1")
+    return {name: _coded(row) for name, row in zip(model.names, percent, strict=True)}
 
 
 def _coded(array: np.ndarray) -> str:

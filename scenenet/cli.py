@@ -11,11 +11,14 @@ import sys
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from scenenet.errors import InputError
+
+if TYPE_CHECKING:
+    from scenenet.detection import DetectionSettings
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
@@ -71,6 +74,14 @@ ModelFile = Annotated[Path, typer.Option("--model", help="Model file (.json or .
 LabelCodes = Annotated[
     Codes,
     typer.Option("--codes", help="What the class codes mean; wires are 16 in edp, 14 in asprs."),
+]
+MinWire = Annotated[
+    float | None,
+    typer.Option(
+        min=0,
+        help="How far wires must be followed from a tower, as a part of the way from 3 to 20 m off "
+        "it; 0.75 if not given, 0 for towers that carry none.",
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the answer as JSON on stdout.")]
 
@@ -206,10 +217,10 @@ def predict(
         float | None,
         typer.Option(min=0.01, help="Edge of a voxel in m; as the model was trained if not given."),
     ] = None,
+    min_wire: MinWire = None,
     as_json: AsJson = False,
 ) -> None:
     """Classify surveys: DIR/NAME.laz, NAME.towers.geojson and NAME.summary.json for each."""
-    from scenenet.detection import DetectionSettings
     from scenenet.inference import PredictSettings, predict_survey
 
     names = [survey.stem for survey in surveys]
@@ -234,7 +245,7 @@ def predict(
                 target.with_suffix(".towers.geojson"),
                 target.with_suffix(".summary.json"),
                 settings,
-                DetectionSettings(),
+                _detection(min_wire),
             )
         )
     _answer(
@@ -261,14 +272,14 @@ def evaluate(
     resolution: Annotated[
         int, typer.Option(help="Voxels an edge for --fit cube: 32, 64, 128, 256.")
     ] = 64,
+    min_wire: MinWire = None,
     as_json: AsJson = False,
 ) -> None:
     """Score a model on labelled crops or surveys: voxels and towers."""
-    from scenenet.detection import DetectionSettings
     from scenenet.labelled import evaluate_files
 
     grid = _cube(resolution) if fit is Fit.cube else None
-    result = evaluate_files(labelled, model, codes.value, grid, DetectionSettings())
+    result = evaluate_files(labelled, model, codes.value, grid, _detection(min_wire))
     for skipped in result["skipped"]:
         print(f"not scored: {skipped['sample']}: {skipped['reason']}", file=sys.stderr)
     _answer(result, as_json, _score_lines)
@@ -279,16 +290,16 @@ def explain(
     survey: Annotated[Path, typer.Argument(help="LAS, LAZ or COPC survey, or a TS40K sample.")],
     model: ModelFile,
     out: Annotated[Path, typer.Option("--out", help="Page to write (.html).")],
+    min_wire: MinWire = None,
     as_json: AsJson = False,
 ) -> None:
     """Write a page that says for every tower why it is one."""
     from dataclasses import asdict
 
-    from scenenet.detection import DetectionSettings
     from scenenet.inference import PredictSettings
     from scenenet.report.receipts import explain_survey
 
-    found = explain_survey(survey, model, out, PredictSettings(), DetectionSettings())
+    found = explain_survey(survey, model, out, PredictSettings(), _detection(min_wire))
     _answer(
         [asdict(receipt) for receipt in found],
         as_json,
@@ -353,6 +364,12 @@ def _training_lines(result: dict[str, Any]) -> list[str]:
         f"R {scores['recall']:.2f} F0.5 {scores['f05']:.3f} tower IoU {scores['iou_tower']:.3f}",
     ]
     return lines + [f"left out: {s['sample']}: {s['reason']}" for s in result["skipped"]]
+
+
+def _detection(min_wire: float | None) -> DetectionSettings:
+    from scenenet.detection import DetectionSettings
+
+    return DetectionSettings() if min_wire is None else DetectionSettings(min_wire=min_wire)
 
 
 def _score_lines(result: dict[str, Any]) -> list[str]:

@@ -112,6 +112,24 @@ def test_evaluate_at_the_models_voxel_size_looks_through_the_whole_survey(survey
     assert json.loads(done.stdout)["towers"]["n_true"] == 4
 
 
+@pytest.mark.parametrize("command", ["predict", "evaluate", "explain"])
+def test_towers_without_wires_can_be_asked_for(command, model, tmp_path):
+    shown = scenenet(command, "--help")
+    assert "--min-wire" in shown.stdout
+    refused = scenenet(command, "nowhere.laz", "--model", model, "--min-wire", "-1")
+    assert refused.returncode == 2
+    assert "--min-wire" in refused.stderr
+
+
+def test_what_is_asked_of_wires_is_written_down(survey, model, tmp_path):
+    done = scenenet(
+        "predict", survey, "--model", model, "--out", tmp_path, "--min-wire", 0, "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    [summary] = json.loads(done.stdout)
+    assert summary["settings"]["detection"]["min_wire"] == 0
+
+
 def test_explain_writes_a_page_that_needs_no_other_file(survey, model, tmp_path):
     page = tmp_path / "why.html"
     done = scenenet("explain", survey, "--model", model, "--out", page, "--json")

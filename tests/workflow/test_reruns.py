@@ -36,6 +36,8 @@ NOISE = {"noise": 2, "noise_runs": 1, "contest_figure": 1, "track_contest": 1}
 """Trainings on wrong labels from two seeds, on lines of their own."""
 BLACK_BOX = {"black_box": 1}
 LEARNED = {**TRAINED, **STUDIED, **BLACK_BOX}
+"""What follows from other voxels."""
+FROM_CROPS = {**LEARNED, "grid_times": 1}
 """What follows from other crops."""
 SETTINGS = {"resolved_config": 1}
 """The settings are written down whenever there are others."""
@@ -63,7 +65,7 @@ def test_a_survey_to_train_on_makes_a_larger_dataset_and_reads_no_other_survey_a
     project.add_row("another", "data/another.laz", "edp", "train")
     own = {"check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1,
            "survey_map": 1}  # fmt: skip
-    assert project.planned() == {**own, "split": 1, **LEARNED}
+    assert project.planned() == {**own, "split": 1, **FROM_CROPS}
 
 
 def test_touching_a_survey_runs_nothing(project):
@@ -101,7 +103,7 @@ def test_another_recipe_makes_one_synthetic_survey_anew(project):
     project.edit("config/config.yaml", "seed: 2", "seed: 22")
     own = {"synthesize": 1, "check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1,
            "survey_map": 1}  # fmt: skip
-    assert project.planned() == {**SETTINGS, **own, "split": 1, **LEARNED}
+    assert project.planned() == {**SETTINGS, **own, "split": 1, **FROM_CROPS}
 
 
 # Settings
@@ -252,7 +254,7 @@ def test_editing_a_script_runs_its_rule(project):
 @pytest.mark.parametrize("file", ["crops.zarr.zip", "manifest.json"])
 def test_a_deleted_store_or_manifest_is_made_again(project, file):
     (project.results / "crops/first" / file).unlink()
-    assert project.planned() == {"crops": 1, "split": 1, "voxels": 1, **LEARNED}
+    assert project.planned() == {"crops": 1, "split": 1, "voxels": 1, **FROM_CROPS}
 
 
 def test_a_deleted_cache_of_voxels_is_made_again(project):

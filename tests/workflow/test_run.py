@@ -18,7 +18,7 @@ pytestmark = pytest.mark.workflow
 STAGES = {
     *("synthesize", "check", "towers", "crops", "voxels", "split"),
     *("train", "tune", "champion", "evaluate", "predict"),
-    *("certificate", "timing"),
+    *("certificate", "timing", "grid_times"),
     *("study", "black_box", "tables", "figures", "scene"),
     *("noise", "contest_runs"),
     *("track", "track_studies", "track_contest", "register", "report"),

@@ -6,7 +6,6 @@ Measured in the occupied voxels. Places are (M, 3) m, middles of voxels of one l
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -29,21 +28,6 @@ MIDDLE = 0.3, 0.9
 LOOKS = 2.0, 1.5, 1.0
 """Radii, as multiples of the slim one, at which the middle is looked for one after the other: a
 model that saw a leg or a crossarm put the axis beside it."""
-
-
-class Standing(Protocol):
-    """What is known of a tower that stands; all in m."""
-
-    @property
-    def x(self) -> float: ...
-    @property
-    def y(self) -> float: ...
-    @property
-    def base(self) -> float: ...
-    @property
-    def height(self) -> float: ...
-    @property
-    def width(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -141,19 +125,3 @@ def middle(
             at, width = np.median(middles, axis=0), float(np.median(widths))
             free = len(middles) / len(np.unique(steps[mine, 2]))
     return axis + at, width, free
-
-
-def of_body(
-    around: np.ndarray, tower: Standing, radius: float, beside: float, foot: float
-) -> np.ndarray:
-    """Which occupied voxels (M, 3) m are of a tower's body, (M,) bool.
-
-    Args:
-        radius: m about the axis, at least.
-        beside: m that it goes beyond half the width of a wider one.
-        foot: m above the ground where it begins.
-    """
-    distance = np.hypot(around[:, 0] - tower.x, around[:, 1] - tower.y)
-    level = around[:, 2] - tower.base
-    reach = max(radius, tower.width / 2 + beside)
-    return (distance <= reach) & (level >= foot) & (level <= tower.height)

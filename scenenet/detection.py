@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydantic import Field
 
-from scenenet.bodies import middle, of_body, standing
+from scenenet.bodies import middle, standing
 from scenenet.settings import Settings
 from scenenet.wires import FAR, SCALES, Span, leaving_spans
 
@@ -77,7 +77,6 @@ class DetectionSettings(Settings):
         description="share of the body at which nothing may touch it where tau is not reached: a "
         "tree under a line has its crown",
     )
-
     body: float = Field(
         2.1,
         gt=0,
@@ -180,7 +179,10 @@ def whole_tower(
     What reaches tau beside the body, at crossarms, is the tower's as well: see
     ``DetectedTower.voxels``.
     """
-    return of_body(occupied, tower, settings.body, settings.beside_body, settings.foot)
+    distance = np.hypot(occupied[:, 0] - tower.x, occupied[:, 1] - tower.y)
+    level = occupied[:, 2] - tower.base
+    reach = max(settings.body, tower.width / 2 + settings.beside_body)
+    return (distance <= reach) & (level >= settings.foot) & (level <= tower.height)
 
 
 def among(places: np.ndarray) -> Surroundings:

@@ -101,23 +101,10 @@ def score_answers(
         counts = of_towers if whole_towers else of_observer
         occupied += confusion(chosen[sample.index], truth[sample.index], level)
         curve += ThresholdCurve.of(probability, truth)
-        match = match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)
+        match = _match(found, crop)
         towers += match
-        per_sample.append(
-            {
-                "id": sample.id,
-                **counts.scores(),
-                "tp": counts.tp,
-                "fp": counts.fp,
-                "fn": counts.fn,
-                "tn": counts.tn,
-                "f05_observer": of_observer.f05,
-                "f05_towers": of_towers.f05,
-                "towers_true": match.n_true,
-                "towers_predicted": match.n_predicted,
-                "position_error_m": float(match.errors.min()) if len(match.errors) else None,
-            }
-        )
+        both = {"f05_observer": of_observer.f05, "f05_towers": of_towers.f05}
+        per_sample.append(_sample_row(sample, counts, match) | both)
     shared = {"tau": tau, "n_samples": len(pairs)}
     every = whole if whole_towers else reached
     return {
@@ -135,6 +122,24 @@ def score_answers(
         "pr_curve": curve_columns(curve),
         "average_precision": curve.average_precision(),
     }
+
+
+def _sample_row(sample: VoxelSample, counts: Confusion, match: TowerMatch) -> dict[str, Any]:
+    return {
+        "id": sample.id,
+        **counts.scores(),
+        "tp": counts.tp,
+        "fp": counts.fp,
+        "fn": counts.fn,
+        "tn": counts.tn,
+        "towers_true": match.n_true,
+        "towers_predicted": match.n_predicted,
+        "position_error_m": float(match.errors.min()) if len(match.errors) else None,
+    }
+
+
+def _match(found: Sequence[DetectedTower], crop: Crop) -> TowerMatch:
+    return match_towers(np.array([[tower.x, tower.y] for tower in found]), crop.towers)
 
 
 def find_in_crop(
@@ -178,7 +183,7 @@ def crop_towers(
 ) -> TowerMatch:
     """Towers found in a crop against the true ones; probability as in ``find_in_crop``."""
     found, _ = find_in_crop(sample, probability, tau, detection)
-    return match_towers(np.array([[t.x, t.y] for t in found]), crop.towers)
+    return _match(found, crop)
 
 
 def evaluate_black_box(

@@ -24,6 +24,7 @@ lint: $(INSTALLED)  ## style, types, formatting
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports
 	$(VENV)/bin/snakefmt --check Snakefile workflow
 
 clean:  ## remove what Python and the tools leave behind; results stay

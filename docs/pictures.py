@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenenet.errors import InputError
-from scenenet.files import atomic
+from scenenet.core.errors import InputError
+from scenenet.core.files import atomic
 from scenenet.tracking.ui import comparison, experiment_runs, metric_over_steps, serving
 
 if TYPE_CHECKING:

@@ -25,6 +25,8 @@ hypothesis.settings.register_profile(
 hypothesis.settings.register_profile("explore", deadline=None, max_examples=2000)
 hypothesis.settings.load_profile("same-each-time")
 
+pytest_plugins = ["fixtures.noisy_lines", "fixtures.result_folder"]
+
 ROOT = Path(__file__).resolve().parent.parent
 
 PLACE = np.array([500_000.0, 4_630_000.0, 100.0])
@@ -111,8 +113,8 @@ def scene() -> Callable[..., PointCloud]:
 @pytest.fixture(scope="session")
 def pole_finder():
     """A SCENE-Net with numbers set by hand, and its card."""
-    from scenenet.modelfile import ModelCard
-    from scenenet.models import SceneNet
+    from scenenet.models.model_file import ModelCard
+    from scenenet.models.scenenet import SceneNet
 
     model = SceneNet()
     model.set_shape_parameters(POLE_NUMBERS)
@@ -131,8 +133,8 @@ def pole_finder():
 @pytest.fixture(scope="session")
 def real_samples(real_data: Path):
     """The real TS40K crops at 64^3, by name."""
+    from scenenet.dataset.voxels import VoxelGrid, voxelise
     from scenenet.pointcloud import read
-    from scenenet.voxels import VoxelGrid, voxelise
 
     samples = {}
     for path in sorted((real_data / "ts40k").glob("*.npy")):
@@ -219,11 +221,11 @@ def chain(scene, tmp_path_factory: pytest.TempPathFactory) -> Chain:
     """A survey of six poles 60 m apart, cut, voxelised at 1 m and split 2 / 1 / 3."""
     import pandas as pd
 
-    from scenenet.crops import CropSettings, cut_crops
+    from scenenet.dataset.crops import CropSettings, cut_crops
+    from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
+    from scenenet.dataset.voxel_cache import build
+    from scenenet.dataset.voxels import VoxelSettings
     from scenenet.pointcloud import write_las
-    from scenenet.towers import TowerSettings, survey_towers
-    from scenenet.voxel_store import build
-    from scenenet.voxels import VoxelSettings
 
     folder = tmp_path_factory.mktemp("chain")
     files = Chain(*(folder / n for n in ("s.laz", "crops.json", "voxels.json", "split.csv")))

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import typer
 
-from scenenet.cli import app
+from scenenet.cli.app import app
 from scenenet.geneo import registry
-from scenenet.models import SceneNet
+from scenenet.models.scenenet import SceneNet
 
 
 def test_the_kernel_of_the_guide_can_be_added_as_it_stands_there(project_root, monkeypatch):

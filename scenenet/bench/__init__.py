@@ -11,7 +11,7 @@
 
 from __future__ import annotations
 
+from scenenet.bench.measurements import BenchSettings, bench
 from scenenet.bench.report import tables
-from scenenet.bench.sections import BenchSettings, bench
 
 __all__ = ["BenchSettings", "bench", "tables"]

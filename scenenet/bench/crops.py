@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
 from scenenet.pointcloud import PointCloud, read
-from scenenet.pointcloud.samples import sample_files
+from scenenet.pointcloud.ts40k import sample_files
 
 
 def synthetic_crops(n: int, seed: int = 0) -> list[PointCloud]:

@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from scenenet.dataset.voxels import VoxelGrid
 from scenenet.pointcloud import PointCloud
-from scenenet.voxels import VoxelGrid
 
 
 def conv3d_summed(volume: Tensor, kernels: Tensor) -> Tensor:

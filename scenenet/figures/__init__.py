@@ -3,6 +3,6 @@
 ``charts`` and ``scenes`` draw plain data; ``plan`` says what a result folder gets.
 """
 
-from scenenet.figures.plan import CROP_RANKS, Drawing, Picture, draw_all, plan, read_pictures
+from scenenet.figures.catalogue import CROP_RANKS, Drawing, Picture, draw_all, plan, read_pictures
 
 __all__ = ["CROP_RANKS", "Drawing", "Picture", "draw_all", "plan", "read_pictures"]

@@ -10,6 +10,8 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
+from scenenet.geneo.sentences import Sentence
+
 BASE = 2.0
 """Radius in voxels that a tower's body has by hand: half of the mean width of 4.15 m (thesis 5.1.2)
 in voxels of about a metre, as a crop has at 64^3."""
@@ -31,6 +33,7 @@ class ShapeParameter:
             high, and never below a thousandth of high, if None.
         by_hand: what somebody who knows towers would set it to, in ``unit`` (thesis 5.3.4,
             "handcrafted values"); the middle of the range if None.
+        sentence: its value in metres in words (thesis 5.2.2); ``meaning`` and the value if None.
     """
 
     name: str
@@ -40,6 +43,7 @@ class ShapeParameter:
     meaning: str
     metric: tuple[float, float] | None = None
     by_hand: float | None = None
+    sentence: Sentence | None = None
 
     @property
     def handcrafted(self) -> float:
@@ -62,8 +66,8 @@ class Lattice:
     """The places at which a kernel is sampled, in voxels or in metres.
 
     The kernel's centre lies on element ``(k - 1) // 2`` of each axis, the element that the
-    convolution puts on the voxel it answers for (see ``scenenet.convolution``). An even size has
-    one more element on the high side; so no size shifts the answer by half a voxel.
+    convolution puts on the voxel it answers for (see ``scenenet.convolution.convolve``). An even
+    size has one more element on the high side; so no size shifts the answer by half a voxel.
 
     Attributes:
         size: (kz, ky, kx).

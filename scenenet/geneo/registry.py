@@ -6,7 +6,7 @@ import importlib
 import pkgutil
 from functools import cache
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
 from scenenet.geneo import kernels
 from scenenet.geneo.kernel import GeneoKernel
 

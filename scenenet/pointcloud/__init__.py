@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from scenenet.pointcloud import check
+from scenenet.pointcloud.append_dimensions import add_dimensions
+from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme, class_scheme
 from scenenet.pointcloud.cloud import PointCloud
-from scenenet.pointcloud.extend import add_dimensions
-from scenenet.pointcloud.schemes import SCHEMES, ClassScheme, class_scheme
-from scenenet.pointcloud.survey import SurveyInfo, iter_chunks, read, survey_in_metres, survey_info
-from scenenet.pointcloud.write import write_las
+from scenenet.pointcloud.las.writing import write_las
+from scenenet.pointcloud.quality import check
+from scenenet.pointcloud.reading import SurveyInfo, iter_chunks, read, survey_in_metres, survey_info
 
 __all__ = [
     "SCHEMES",

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenenet.errors import InputError
-from scenenet.pointcloud.schemes import ClassScheme
+from scenenet.core.errors import InputError
+from scenenet.pointcloud.class_schemes import ClassScheme
 
 if TYPE_CHECKING:
     import pyproj

@@ -97,7 +97,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Scene:
-    """A crop that can be turned; ``data`` is of ``scenenet.scenes3d``."""
+    """A crop that can be turned; ``data`` is of ``scenenet.figures.interactive_crop``."""
 
     name: str
     title: str

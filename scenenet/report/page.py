@@ -7,41 +7,39 @@ import struct
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenenet.errors import InputError
-from scenenet.files import write_text
-from scenenet.published import Thesis
-from scenenet.report import (
-    contest_sections,
-    crop_sections,
-    data_sections,
-    learned_sections,
-    model_sections,
-    overview,
-    study_sections,
-    survey_sections,
-)
+from scenenet.core.errors import InputError
+from scenenet.core.files import write_text
+from scenenet.experiments.published import Thesis
 from scenenet.report.blocks import Section
-from scenenet.report.material import Material, SectionMaker
-from scenenet.results import Results
+from scenenet.report.context import Material, SectionMaker
+from scenenet.report.sections import crops as crop_sections
+from scenenet.report.sections import dataset as dataset_sections
+from scenenet.report.sections import experiments as experiment_sections
+from scenenet.report.sections import models as model_sections
+from scenenet.report.sections import overview
+from scenenet.report.sections import parameters as parameter_sections
+from scenenet.report.sections import studies as study_sections
+from scenenet.report.sections import surveys as survey_sections
+from scenenet.results.folder import Results
 
 TITLE = "Towers of power lines, found by SCENE-Net"
-HERE = Path(__file__).parent
+ASSETS = Path(__file__).parent / "assets"
 
 SECTIONS: Sequence[SectionMaker] = (
     overview.overview,
-    contest_sections.cross_validation,
+    experiment_sections.cross_validation,
     model_sections.models,
     model_sections.positions,
-    learned_sections.learned,
-    learned_sections.certificate,
+    parameter_sections.learned,
+    parameter_sections.certificate,
     crop_sections.crops,
     study_sections.studies,
-    contest_sections.noise,
+    experiment_sections.noise,
     study_sections.thesis_and_ours,
     survey_sections.predictions,
-    data_sections.data,
-    data_sections.towers,
-    data_sections.voxels,
+    dataset_sections.data,
+    dataset_sections.towers,
+    dataset_sections.voxels,
     model_sections.training,
     survey_sections.provenance,
 )
@@ -77,15 +75,15 @@ def render(made: Sequence[Section], title: str, source: str) -> str:
     from markupsafe import Markup
 
     environment = Environment(
-        loader=FileSystemLoader(HERE),
+        loader=FileSystemLoader(ASSETS),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
     environment.filters |= {"data_uri": data_uri, "png_size": png_size}
-    style = Markup((HERE / "style.css").read_text(encoding="utf-8"))
-    script = Markup((HERE / "page.js").read_text(encoding="utf-8"))
+    style = Markup((ASSETS / "style.css").read_text(encoding="utf-8"))
+    script = Markup((ASSETS / "page.js").read_text(encoding="utf-8"))
     page = environment.get_template("page.html")
     return page.render(title=title, sections=made, style=style, script=script, source=source)
 

@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from scenenet.synthetic.corridor import (
-    Corridor,
-    Stretch,
-    TrueTower,
-    corridor_cloud,
-    make_corridor,
-)
+from scenenet.synthetic.corridor import Corridor, Stretch, TrueTower, corridor_cloud, make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.synthetic.survey import make_survey, towers_geojson
 

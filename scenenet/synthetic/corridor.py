@@ -12,24 +12,23 @@ import numpy as np
 import pyproj
 import pyproj.exceptions
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
+from scenenet.pointcloud.class_schemes import EDP
 from scenenet.pointcloud.cloud import PointCloud
-from scenenet.pointcloud.schemes import EDP
-from scenenet.synthetic.annotation import annotate
-from scenenet.synthetic.clutter import clutter_points
-from scenenet.synthetic.codes import TOWER
-from scenenet.synthetic.cover import GroundCover
-from scenenet.synthetic.flight import Flight, flight_of
-from scenenet.synthetic.line import FOOT, STRETCH, Line, Support
-from scenenet.synthetic.noise import Raster, stream
-from scenenet.synthetic.scan import Scanner
-from scenenet.synthetic.settings import SyntheticSettings
-from scenenet.synthetic.strays import stray_points
-from scenenet.synthetic.strip import Strip
-from scenenet.synthetic.structures import place, sample
-from scenenet.synthetic.terrain import Terrain
-from scenenet.synthetic.vegetation import WIDEST_CROWN_M, Vegetation, keep_clear
-from scenenet.synthetic.wires import other_cables, wire_points
+from scenenet.synthetic.annotation_noise import annotate
+from scenenet.synthetic.returns.clutter import clutter_points
+from scenenet.synthetic.returns.conductors import other_cables, wire_points
+from scenenet.synthetic.returns.flight import Flight, flight_of
+from scenenet.synthetic.returns.scan import Scanner
+from scenenet.synthetic.returns.stray_returns import stray_points
+from scenenet.synthetic.scene.ground_cover import GroundCover
+from scenenet.synthetic.scene.line import FOOT, STRETCH, Line, Support
+from scenenet.synthetic.scene.random_fields import Raster, stream
+from scenenet.synthetic.scene.strip import Strip
+from scenenet.synthetic.scene.terrain import Terrain
+from scenenet.synthetic.scene.towers import place, sample
+from scenenet.synthetic.scene.vegetation import WIDEST_CROWN_M, Vegetation, keep_clear
+from scenenet.synthetic.settings import TOWER, SyntheticSettings
 
 Coded = tuple[np.ndarray, np.ndarray]
 """Points (N, 3) and their codes (N,)."""

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from scenenet.files import write_json
-from scenenet.pointcloud.write import las_stream
-from scenenet.progress import track
-from scenenet.synthetic.codes import TOWER
+from scenenet.core.files import write_json
+from scenenet.core.progress import track
+from scenenet.pointcloud.las.writing import las_stream
 from scenenet.synthetic.corridor import TrueTower, make_corridor
-from scenenet.synthetic.settings import SyntheticSettings
+from scenenet.synthetic.settings import TOWER, SyntheticSettings
 
 
 def make_survey(

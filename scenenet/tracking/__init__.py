@@ -1,7 +1,7 @@
 """Every training as a run in MLflow, to be compared side by side."""
 
-from scenenet.tracking.records import model_groups
-from scenenet.tracking.runs import RunGroup, RunRecord, log_runs
+from scenenet.tracking.model_runs import model_groups
+from scenenet.tracking.run_log import RunGroup, RunRecord, log_runs
 from scenenet.tracking.store import TrackingSettings, create_store, store_id
 
 __all__ = [

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scenenet import files
-from scenenet.errors import InputError
-from scenenet.results import Results, SeedResult
+from scenenet.core import files
+from scenenet.core.errors import InputError
+from scenenet.results.folder import Results, SeedResult
 from scenenet.tracking.store import TrackingSettings, exclusive, open_client, store_errors
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 ALIAS = "champion"
 FOLDER = "served"
-"""Where a run keeps its model as it is served."""
+"""Where a run keeps its model as it is pyfunc_model."""
 DIGEST_TAG = "scenenet.digest"
 
 
@@ -112,12 +112,12 @@ def _save(folder: Path, champion: SeedResult) -> None:
     from mlflow.models import ModelSignature
     from mlflow.types import Schema, TensorSpec
 
-    from scenenet.tracking import served
+    from scenenet.tracking import pyfunc_model
 
     grids = Schema([TensorSpec(np.dtype(np.float32), (-1, -1, -1, -1))])
     mlflow.pyfunc.save_model(
         folder,
-        python_model=str(served.__file__),
+        python_model=str(pyfunc_model.__file__),
         artifacts={"model": str(champion.model_files[0].resolve())},
         signature=ModelSignature(inputs=grids, outputs=grids),
         pip_requirements=["scenenet"],

@@ -15,16 +15,16 @@ from urllib.parse import unquote, urlparse
 
 from pydantic import Field
 
-from scenenet import files
-from scenenet.errors import InputError
-from scenenet.settings import Settings
+from scenenet.core import files
+from scenenet.core.errors import InputError
+from scenenet.core.settings import Settings
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
     from mlflow.entities import Experiment
 
 SQLITE = "sqlite:///"
-STORE_TAG = "scenenet.store"
+STORE_TAG = "scenenet.dataset.zarr_store"
 EXPERIMENT_TAGS = {"mlflow.experimentKind": "custom_model_development"}
 """Opens the experiment in MLflow's view of trainings instead of the one for language models."""
 

@@ -16,7 +16,7 @@ import urllib.request
 from collections.abc import Iterator, Sequence
 from urllib.parse import quote, urlencode
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
 
 HOST = "127.0.0.1"
 START_LIMIT_S = 120.0

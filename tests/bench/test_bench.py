@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 import torch
 
-from scenenet.batches import batch
-from scenenet.bench import BenchSettings, peers, sections, tables
+from scenenet.bench import BenchSettings, peers, tables
+from scenenet.bench import measurements as sections
 from scenenet.bench.crops import crops_in, synthetic_crops
 from scenenet.bench.timing import medians
-from scenenet.convolution import convolve
-from scenenet.errors import InputError
-from scenenet.losses import VoxelWeights, fidelity
-from scenenet.models import SceneNet
-from scenenet.voxels import VoxelSettings, voxelise
+from scenenet.convolution.convolve import convolve
+from scenenet.core.errors import InputError
+from scenenet.dataset.batches import batch
+from scenenet.dataset.voxels import VoxelSettings, voxelise
+from scenenet.models.scenenet import SceneNet
+from scenenet.training.losses import VoxelWeights, fidelity
 
 
 @pytest.fixture(scope="module")

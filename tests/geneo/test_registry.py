@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from scenenet.convolution import Occupancy
-from scenenet.errors import InputError
+from scenenet.convolution.occupancy import Occupancy
+from scenenet.core.errors import InputError
 from scenenet.geneo import (
     GeneoKernel,
     ShapeParameter,
@@ -19,8 +19,8 @@ from scenenet.geneo import (
     registry,
 )
 from scenenet.geneo import kernels as kernels_package
-from scenenet.modelfile import ModelCard, read_model, write_model
-from scenenet.models import SceneNet
+from scenenet.models.model_file import ModelCard, read_model, write_model
+from scenenet.models.scenenet import SceneNet
 
 DISC = """
 import torch

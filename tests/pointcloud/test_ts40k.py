@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
 from scenenet.pointcloud import add_dimensions, iter_chunks, read, survey_info
 
 POINTS = np.array([[544851.61, 4634539.49, 159.49, 15], [544880.48, 4634566.31, 223.57, 16]])

@@ -12,9 +12,9 @@ import laspy
 import numpy as np
 import pytest
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
 from scenenet.pointcloud import read, survey_info
-from scenenet.pointcloud.check import check_survey
+from scenenet.pointcloud.quality.check import check_survey
 
 TIME_LIMIT_S = 10
 REFUSED = {

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenenet.metrics import ThresholdCurve
-from scenenet.published import Thesis
+from scenenet.experiments.published import Thesis
+from scenenet.figures.interactive_crop import write_scene
+from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.report import write_report
-from scenenet.results import Results
-from scenenet.scenes3d import write_scene
+from scenenet.results.folder import Results
 
 SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
 PHONE_PX = 390

@@ -10,16 +10,17 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
+from scenenet.core.files import read_json, write_json
+from scenenet.experiments.published import Thesis
+from scenenet.experiments.studies.run import COLUMNS
+from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
-from scenenet.files import read_json, write_json
-from scenenet.published import Thesis
 from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
-from scenenet.results import Results
-from scenenet.studies.run import COLUMNS
-from scenenet.studies.settings import StudySettings
-from scenenet.tables import whole_towers, write_tables
+from scenenet.results.folder import Results
+from scenenet.results.score_tables import whole_towers
+from scenenet.results.tables import write_tables
 
 VOID = {"meta", "img", "br", "hr", "link"}
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from scenenet.errors import InputError
-from scenenet.pointcloud.schemes import EDP
+from scenenet.core.errors import InputError
+from scenenet.pointcloud.class_schemes import EDP
 from scenenet.synthetic import corridor_cloud, make_corridor
-from scenenet.synthetic.codes import ON_GROUND, TALL, TOWER, TREE, WIRE
+from scenenet.synthetic.settings import ON_GROUND, TALL, TOWER, TREE, WIRE
 
 
 def test_same_seed_same_points(small):
@@ -143,7 +143,7 @@ def test_classes_are_edp_codes_with_the_bulk_where_the_thesis_has_it(default):
 
 
 def test_dbscan_of_the_thesis_finds_every_tower(default):
-    from scenenet.towers import TowerSettings, find_towers
+    from scenenet.dataset.labelled_towers import TowerSettings, find_towers
 
     _, cloud, _, towers = default
     found = find_towers(cloud.xyz[cloud.is_tower], TowerSettings())

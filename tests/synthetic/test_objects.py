@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from scenenet.synthetic import corridor_cloud, make_corridor
-from scenenet.synthetic.clutter import MAKERS
-from scenenet.synthetic.codes import LOW, ON_GROUND, STRAY, TALL, TOWER, TREE, WATER, WIRE
-from scenenet.synthetic.structures import KINDS
-from scenenet.synthetic.wires import BUNDLE_M, bundled
+from scenenet.synthetic.returns.clutter import MAKERS
+from scenenet.synthetic.returns.conductors import BUNDLE_M, bundled
+from scenenet.synthetic.scene.towers import KINDS
+from scenenet.synthetic.settings import LOW, ON_GROUND, STRAY, TALL, TOWER, TREE, WATER, WIRE
 
 
 def heights(settings, cloud, truth, codes):

@@ -8,7 +8,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from scenenet.errors import InputError
+from scenenet.core.errors import InputError
 from scenenet.pointcloud import read
 from scenenet.synthetic import corridor_cloud, make_corridor, make_survey
 

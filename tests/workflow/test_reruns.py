@@ -34,8 +34,8 @@ STUDIED = {"study": 2, "study_figure": 2, "track_studies": 1}
 """There are two studies, of one model."""
 NOISE = {"noise": 2, "noise_runs": 1, "contest_figure": 1, "track_contest": 1}
 """Trainings on wrong labels from two seeds, on lines of their own."""
-BLACK_BOX = {"black_box": 1}
-LEARNED = {**TRAINED, **STUDIED, **BLACK_BOX}
+BOOSTED_TREES = {"black_box": 1}
+LEARNED = {**TRAINED, **STUDIED, **BOOSTED_TREES}
 """What follows from other voxels."""
 FROM_CROPS = {**LEARNED, "grid_times": 1}
 """What follows from other crops."""
@@ -128,7 +128,7 @@ def test_writing_a_default_down_changes_nothing(project):
 def test_a_setting_of_one_stage_runs_that_stage_and_what_follows(project):
     project.configure({"detection.eps": 7.0})
     after = {"evaluate": 4, "tables": 1, "figures": 1, "track": 1, "register": 1, "scene": 3}
-    assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BLACK_BOX}
+    assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BOOSTED_TREES}
 
 
 def test_another_resolution_keeps_the_grids_there_are(project):
@@ -146,14 +146,14 @@ def test_predicting_with_another_model_trains_nothing(project):
 def test_one_more_seed_trains_only_that_seed(project):
     project.configure({"seeds": [0, 1, 2]})
     own = {"train": 1, "train_cnn": 1, "tune": 1, "tune_cnn": 1, "evaluate": 2}
-    assert project.planned() == {**SETTINGS, **TRAINED, **BLACK_BOX, **own}
+    assert project.planned() == {**SETTINGS, **TRAINED, **BOOSTED_TREES, **own}
 
 
 def test_one_seed_less_trains_nothing(project):
     project.configure({"seeds": [0]})
     picked = {"champion": 1, "champion_cnn": 1, "certificate": 2, "timing": 2}
     gathered = {**picked, "tables": 1, "figures": 1, "track": 1, "register": 1, "scene": 3}
-    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BLACK_BOX}
+    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BOOSTED_TREES}
 
 
 def test_one_more_model_leaves_the_others_alone(project):
@@ -259,7 +259,7 @@ def test_a_deleted_store_or_manifest_is_made_again(project, file):
 
 def test_a_deleted_cache_of_voxels_is_made_again(project):
     (project.results / "voxels/second/cube-32/voxels.zarr.zip").unlink()
-    assert project.planned() == {"voxels": 1, **TRAINED, **BLACK_BOX}
+    assert project.planned() == {"voxels": 1, **TRAINED, **BOOSTED_TREES}
 
 
 @pytest.mark.parametrize(

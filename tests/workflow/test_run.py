@@ -10,8 +10,8 @@ import sqlite3
 import pytest
 import yaml
 
-from scenenet.config import load
-from scenenet.files import digest, read_json
+from scenenet.config.schema import load
+from scenenet.core.files import digest, read_json
 
 pytestmark = pytest.mark.workflow
 

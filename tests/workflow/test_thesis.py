@@ -10,7 +10,7 @@ import pytest
 import yaml
 from markupsafe import escape
 
-from scenenet.files import read_json
+from scenenet.core.files import read_json
 
 pytestmark = pytest.mark.workflow
 

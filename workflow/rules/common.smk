@@ -7,15 +7,15 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from scenenet.codehash import code_hash
-from scenenet.config import load
-from scenenet.errors import InputError
+from scenenet.core.code_hash import code_hash
+from scenenet.config.schema import load
+from scenenet.core.errors import InputError
 from scenenet.figures import CROP_RANKS, plan
-from scenenet.files import digest
-from scenenet.provenance import fingerprint
-from scenenet.results import Results
-from scenenet.surveys import read_surveys
-from scenenet.tables import TABLES as TABLE_NAMES
+from scenenet.core.files import digest
+from scenenet.core.provenance import fingerprint
+from scenenet.results.folder import Results
+from scenenet.config.survey_sheet import read_surveys
+from scenenet.results.tables import TABLES as TABLE_NAMES
 
 try:
     settings = load(config)

@@ -24,7 +24,7 @@ def each_seed_of(model):
 
 
 def gathered(models=None, surveys=TRAIN, predicted=(), studies=(), contests=(), predicts=None):
-    """The arguments of ``scenenet.results.Results``. Models are pairs, because their order counts
+    """The arguments of ``scenenet.results.folder.Results``. Models are pairs, because their order counts
     and that of a dict does not survive in a parameter."""
     chosen = settings.models if models is None else models
     return {
@@ -88,7 +88,7 @@ SCORES = each_training(f"{R}/evaluate/{{model}}/seed-{{seed}}.json")
 CERTIFICATES = [f"{R}/certificates/{model.name}.json" for model in settings.models]
 TIMES = [f"{R}/times/{model.name}.json" for model in settings.models]
 BLACK_BOX_TIMES = f"{R}/black_box/times.json"
-BLACK_BOX = expand(f"{R}/black_box/seed-{{seed}}.json", seed=settings.seeds)
+BOOSTED_TREES = expand(f"{R}/black_box/seed-{{seed}}.json", seed=settings.seeds)
 SCENES = expand(f"{R}/scenes/{{rank}}.json", rank=CROP_RANKS)
 STUDIED = [study.name for study in settings.studies]
 STUDIES = expand(f"{R}/studies/{{study}}/runs.csv", study=STUDIED)

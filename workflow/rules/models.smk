@@ -201,7 +201,7 @@ rule black_box:
         manifests=VOXEL_MANIFESTS,
         split=f"{R}/split/split.csv",
     output:
-        scores=BLACK_BOX,
+        scores=BOOSTED_TREES,
         times=BLACK_BOX_TIMES,
         provenance=f"{R}/black_box/provenance.json",
     log:

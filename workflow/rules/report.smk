@@ -32,7 +32,7 @@ rule tables:
         scores=SCORES,
         studies=STUDIES,
         contests=CONTEST_RUNS,
-        black_box=[*BLACK_BOX, BLACK_BOX_TIMES],
+        black_box=[*BOOSTED_TREES, BLACK_BOX_TIMES],
         certificates=CERTIFICATES,
         times=TIMES,
         thesis=ancient(settings.thesis),

@@ -35,7 +35,7 @@ rule track:
         trainings=TRAININGS,
         tunings=TUNINGS,
         scores=SCORES,
-        black_box=BLACK_BOX,
+        black_box=BOOSTED_TREES,
     output:
         runs=f"{R}/mlflow/runs.json",
         provenance=f"{R}/mlflow/provenance.json",

@@ -46,8 +46,8 @@ class Job:
 
     def made_by(self) -> dict[str, Any]:
         """Settings, code and version, for a file that carries its own record."""
-        from scenenet.files import digest
-        from scenenet.provenance import package_version
+        from scenenet.core.files import digest
+        from scenenet.core.provenance import package_version
 
         return {
             "config": digest(self.identity["settings"]),
@@ -57,7 +57,7 @@ class Job:
 
     def record(self) -> dict[str, Any]:
         """What the result was made from and by."""
-        from scenenet import provenance
+        from scenenet.core import provenance
 
         made_by = self.made_by()
         return provenance.record(
@@ -97,7 +97,7 @@ def run(stage: Callable[[Job], object]) -> None:
     stage(job)
     record = getattr(job.output, "provenance", None)
     if record is not None:
-        from scenenet.files import write_json
+        from scenenet.core.files import write_json
 
         write_json(record, job.record())
 
@@ -148,8 +148,8 @@ def _explain(log: TextIO, kind: type[BaseException], error: BaseException, trace
 def _print(path: str) -> str:
     """Fingerprint of an input. Of a manifest, the digest of the data it stands for: the file also
     holds the seconds that the work took."""
-    from scenenet.files import read_json
-    from scenenet.provenance import fingerprint
+    from scenenet.core.files import read_json
+    from scenenet.core.provenance import fingerprint
 
     if Path(path).name == "manifest.json":
         return f"content:{read_json(path)['content']}"

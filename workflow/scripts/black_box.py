@@ -4,10 +4,10 @@ import adapter
 
 
 def black_box(job: adapter.Job) -> None:
-    from scenenet.detection import DetectionSettings
-    from scenenet.evaluation import evaluate_black_box
+    from scenenet.baselines.evaluate import evaluate_boosted_trees
+    from scenenet.detection.settings import DetectionSettings
 
-    evaluate_black_box(
+    evaluate_boosted_trees(
         job.input.manifests,
         job.input.split,
         DetectionSettings(**job.settings),

@@ -4,8 +4,8 @@ import adapter
 
 
 def certificate(job: adapter.Job) -> None:
-    from scenenet.certificates import certificate
-    from scenenet.files import write_json
+    from scenenet.core.files import write_json
+    from scenenet.interpretability.certificate import certificate
 
     write_json(job.output.certificate, certificate(job.input.model))
 

@@ -4,7 +4,7 @@ import adapter
 
 
 def champion(job: adapter.Job) -> None:
-    from scenenet.tuning import champion
+    from scenenet.training.tuning import champion
 
     champion(job.input.models, job.input.tunings, job.output.model)
 

@@ -4,8 +4,8 @@ import adapter
 
 
 def check(job: adapter.Job) -> None:
-    from scenenet.files import atomic, write_json
-    from scenenet.pointcloud.check import CheckSettings, check_survey
+    from scenenet.core.files import atomic, write_json
+    from scenenet.pointcloud.quality.check import CheckSettings, check_survey
 
     report = check_survey(job.input.survey, job.identity["codes"], CheckSettings(**job.settings))
     write_json(job.output.report, report.to_dict())

@@ -6,8 +6,8 @@ import adapter
 def contest_runs(job: adapter.Job) -> None:
     import pandas as pd
 
-    from scenenet.files import atomic
-    from scenenet.results import read_table
+    from scenenet.core.files import atomic
+    from scenenet.results.folder import read_table
 
     with atomic(job.output.runs) as partial:
         pd.concat([read_table(runs) for runs in job.input.runs]).to_csv(partial, index=False)

@@ -6,7 +6,7 @@ import adapter
 def crops(job: adapter.Job) -> None:
     import pandas as pd
 
-    from scenenet.crops import CropSettings, cut_crops
+    from scenenet.dataset.crops import CropSettings, cut_crops
 
     cut_crops(
         job.identity["survey"],

@@ -4,9 +4,9 @@ import adapter
 
 
 def cross_validate(job: adapter.Job) -> None:
-    from scenenet.contests.cross_validation import cross_validate
-    from scenenet.detection import DetectionSettings
-    from scenenet.protocol import ModelSettings
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.experiments.cross_validation.run import cross_validate
+    from scenenet.models.settings import ModelSettings
 
     model = job.identity["model"]
     cross_validate(

@@ -4,9 +4,9 @@ import adapter
 
 
 def evaluate(job: adapter.Job) -> None:
-    from scenenet.detection import DetectionSettings
-    from scenenet.evaluation import evaluate
-    from scenenet.files import write_json
+    from scenenet.core.files import write_json
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.evaluation.scoring import evaluate
 
     scores = evaluate(
         job.input.model,

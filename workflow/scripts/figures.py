@@ -5,8 +5,8 @@ from gathered import results_of
 
 
 def figures(job: adapter.Job) -> None:
+    from scenenet.experiments.published import read_thesis
     from scenenet.figures import draw_all, plan
-    from scenenet.published import read_thesis
 
     results = results_of(job)
     published = getattr(job.input, "thesis", None)

@@ -6,8 +6,8 @@ import adapter
 
 
 def results_of(job: adapter.Job):
-    from scenenet.results import Results
-    from scenenet.studies.settings import StudySettings
+    from scenenet.experiments.studies.settings import StudySettings
+    from scenenet.results.folder import Results
 
     asked = job.identity["results"]
     studies = [StudySettings(**study) for study in asked["studies"]]

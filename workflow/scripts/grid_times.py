@@ -4,7 +4,7 @@ import adapter
 
 
 def grid_times(job: adapter.Job) -> None:
-    from scenenet.grid_times import time_grids
+    from scenenet.evaluation.voxelisation_time import time_grids
 
     time_grids(job.input.manifests, job.output.times)
 

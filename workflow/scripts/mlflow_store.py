@@ -5,7 +5,7 @@ import adapter
 
 def mlflow_store(job: adapter.Job) -> None:
     from scenenet.tracking import TrackingSettings, create_store
-    from scenenet.tracking.studies import experiment_of
+    from scenenet.tracking.study_runs import experiment_of
 
     settings = TrackingSettings(**job.settings)
     names = [experiment_of(settings, study).experiment for study in job.identity["studies"]]

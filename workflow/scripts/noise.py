@@ -4,10 +4,10 @@ import adapter
 
 
 def noise(job: adapter.Job) -> None:
-    from scenenet.contests.noise import run_noise
-    from scenenet.contests.settings import NoiseSettings
-    from scenenet.protocol import ModelSettings
-    from scenenet.voxels import VoxelSettings
+    from scenenet.dataset.voxels import VoxelSettings
+    from scenenet.experiments.label_noise.run import run_noise
+    from scenenet.experiments.label_noise.settings import NoiseSettings
+    from scenenet.models.settings import ModelSettings
 
     run_noise(
         NoiseSettings(**job.settings),

@@ -4,8 +4,9 @@ import adapter
 
 
 def predict(job: adapter.Job) -> None:
-    from scenenet.detection import DetectionSettings
-    from scenenet.inference import PredictSettings, predict_survey
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.prediction.predict import predict_survey
+    from scenenet.prediction.settings import PredictSettings
 
     predict_survey(
         job.input.survey,

@@ -5,7 +5,7 @@ from gathered import results_of
 
 
 def report(job: adapter.Job) -> None:
-    from scenenet.published import read_thesis
+    from scenenet.experiments.published import read_thesis
     from scenenet.report import write_report
 
     thesis = read_thesis(job.input.thesis)

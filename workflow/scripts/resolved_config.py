@@ -4,7 +4,7 @@ import adapter
 
 
 def resolved_config(job: adapter.Job) -> None:
-    from scenenet.provenance import write_settings
+    from scenenet.core.provenance import write_settings
 
     write_settings(job.output.config, job.settings)
 

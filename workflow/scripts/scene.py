@@ -5,8 +5,8 @@ from gathered import results_of
 
 
 def scene(job: adapter.Job) -> None:
-    from scenenet.detection import DetectionSettings
-    from scenenet.scenes3d import write_scene
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.figures.interactive_crop import write_scene
 
     write_scene(
         results_of(job),

@@ -4,8 +4,8 @@ import adapter
 
 
 def split(job: adapter.Job) -> None:
-    from scenenet.files import atomic
-    from scenenet.split import SplitSettings, split_crops
+    from scenenet.core.files import atomic
+    from scenenet.dataset.split import SplitSettings, split_crops
 
     table = split_crops(job.input.manifests, SplitSettings(**job.settings))
     with atomic(job.output.split) as partial:

@@ -4,11 +4,11 @@ import adapter
 
 
 def study(job: adapter.Job) -> None:
-    from scenenet.protocol import ModelSettings
-    from scenenet.split import SplitSettings
-    from scenenet.studies.run import run_study
-    from scenenet.studies.settings import StudySettings
-    from scenenet.voxels import VoxelSettings
+    from scenenet.dataset.split import SplitSettings
+    from scenenet.dataset.voxels import VoxelSettings
+    from scenenet.experiments.studies.run import run_study
+    from scenenet.experiments.studies.settings import StudySettings
+    from scenenet.models.settings import ModelSettings
 
     run_study(
         job.input.manifests,

@@ -5,9 +5,9 @@ from gathered import results_of
 
 
 def tables(job: adapter.Job) -> None:
-    from scenenet.comparison import write_comparison
-    from scenenet.published import read_thesis
-    from scenenet.tables import write_tables
+    from scenenet.experiments.published import read_thesis
+    from scenenet.results.tables import write_tables
+    from scenenet.results.thesis_comparison import write_comparison
 
     results, thesis = results_of(job), read_thesis(job.input.thesis)
     write_tables(results, thesis, results.folder / "tables")

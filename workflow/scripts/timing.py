@@ -4,8 +4,8 @@ import adapter
 
 
 def timing(job: adapter.Job) -> None:
-    from scenenet.files import write_json
-    from scenenet.model_times import time_model
+    from scenenet.core.files import write_json
+    from scenenet.evaluation.inference_time import time_model
 
     write_json(job.output.times, time_model(job.input.model, job.input.manifests, job.input.split))
 

@@ -4,8 +4,8 @@ import adapter
 
 
 def towers(job: adapter.Job) -> None:
-    from scenenet.files import atomic
-    from scenenet.towers import TowerSettings, survey_towers
+    from scenenet.core.files import atomic
+    from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 
     table = survey_towers(job.input.survey, job.identity["codes"], TowerSettings(**job.settings))
     with atomic(job.output.towers) as partial:

@@ -7,10 +7,10 @@ def track_contest(job: adapter.Job) -> None:
     from pathlib import Path
 
     from scenenet.figures import read_pictures
-    from scenenet.results import read_result, read_table
+    from scenenet.results.folder import read_result, read_table
     from scenenet.tracking import TrackingSettings, log_runs
-    from scenenet.tracking.contests import CONTEST_GROUPS, CONTEST_NOTES, origin_of
-    from scenenet.tracking.studies import experiment_of
+    from scenenet.tracking.experiment_runs import CONTEST_GROUPS, CONTEST_NOTES, origin_of
+    from scenenet.tracking.study_runs import experiment_of
 
     contest = job.identity["contest"]
     settings = experiment_of(TrackingSettings(**job.settings), contest)

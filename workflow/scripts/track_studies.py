@@ -6,11 +6,11 @@ import adapter
 def track_studies(job: adapter.Job) -> None:
     from pathlib import Path
 
+    from scenenet.experiments.studies.settings import StudySettings
     from scenenet.figures import read_pictures
-    from scenenet.results import read_result, read_table
-    from scenenet.studies.settings import StudySettings
+    from scenenet.results.folder import read_result, read_table
     from scenenet.tracking import TrackingSettings, log_runs
-    from scenenet.tracking.studies import experiment_of, note_of, study_groups
+    from scenenet.tracking.study_runs import experiment_of, note_of, study_groups
 
     settings = TrackingSettings(**job.settings)
     studies = [StudySettings(**study) for study in job.identity["studies"]]

@@ -6,11 +6,11 @@ import adapter
 
 
 def train(job: adapter.Job) -> None:
-    from scenenet.files import write_json
-    from scenenet.memory import used
-    from scenenet.protocol import ModelSettings
-    from scenenet.training import train
-    from scenenet.voxels import VoxelSettings
+    from scenenet.core.files import write_json
+    from scenenet.core.peak_memory import used
+    from scenenet.dataset.voxels import VoxelSettings
+    from scenenet.models.settings import ModelSettings
+    from scenenet.training.train import train
 
     train(
         job.input.manifests,

@@ -4,8 +4,8 @@ import adapter
 
 
 def tune(job: adapter.Job) -> None:
-    from scenenet.protocol import TuningSettings
-    from scenenet.tuning import tune
+    from scenenet.models.settings import TuningSettings
+    from scenenet.training.tuning import tune
 
     tune(
         job.input.model,

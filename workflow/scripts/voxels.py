@@ -4,8 +4,8 @@ import adapter
 
 
 def voxels(job: adapter.Job) -> None:
-    from scenenet.voxel_store import build
-    from scenenet.voxels import VoxelSettings
+    from scenenet.dataset.voxel_cache import build
+    from scenenet.dataset.voxels import VoxelSettings
 
     build(job.input.manifest, VoxelSettings(**job.settings), job.output.store, job.output.manifest)
 

@@ -15,6 +15,13 @@ from scenenet.geneo.kernel import (
     zero_sum,
 )
 from scenenet.geneo.registry import register
+from scenenet.geneo.sentences import Numbers, Surroundings, between, body_radius, shell
+
+
+def _body_sigma(n: Numbers, beside: Surroundings) -> str:
+    inner, outer = shell(n["r"], n["sigma"])
+    where = between(inner, outer, "the axis")
+    return f"points {where} count at least half as much as the best, before the mean is taken off"
 
 
 @register
@@ -23,8 +30,19 @@ class Cylinder(GeneoKernel):
 
     name = "cylinder"
     parameters = (
-        ShapeParameter("r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5), BASE),
-        ShapeParameter("sigma", 0.5, 3.0, "voxel^2", "tolerance around that radius", (0.15, 2.25)),
+        ShapeParameter(
+            "r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5), BASE, body_radius
+        ),
+        ShapeParameter(
+            "sigma",
+            0.5,
+            3.0,
+            "voxel^2",
+            "tolerance around that radius",
+            (0.15, 2.25),
+            None,
+            _body_sigma,
+        ),
     )
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:

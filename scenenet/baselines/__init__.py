@@ -1,0 +1,1 @@
+"""The boosted trees that SCENE-Net is compared with."""

@@ -1,0 +1,57 @@
+"""Training, tuning and scoring of the boosted trees from several seeds."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenenet.dataset.split import crops_in
+from scenenet.dataset.voxel_cache import load
+from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.scoring import score_answers
+
+
+def evaluate_boosted_trees(
+    voxel_manifests: Sequence[str | Path],
+    split: str | Path,
+    detection: DetectionSettings,
+    seeds: Sequence[int],
+    outs: Sequence[str | Path],
+    out_times: str | Path,
+) -> None:
+    """Train the black box from each seed, tune it on validation and score it on the test crops.
+
+    Args:
+        outs: JSON file of each seed: what ``score_answers`` says, and ``parameters``.
+        out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels an edge
+            (``scenenet.evaluation.inference_time``), ``peak_memory_mb`` of all of this.
+    """
+    from scenenet.baselines import boosted_trees
+    from scenenet.core.files import write_json
+    from scenenet.core.peak_memory import used
+    from scenenet.evaluation.inference_time import CROPS, milliseconds
+
+    parts = {
+        part: load(voxel_manifests, crops_in(split, part))
+        for part in ("train", "validation", "test")
+    }
+    seconds: list[float] = []
+    took: dict[str, float] = {}
+    for seed, out in zip(seeds, outs, strict=True):
+        begin = time.perf_counter()
+        grown = boosted_trees.fit(
+            parts["train"].samples, boosted_trees.BoostedTreesSettings(), seed
+        )
+        seconds.append(time.perf_counter() - begin)
+        model = boosted_trees.tune(grown, parts["validation"].samples)
+        tau = model.threshold()
+        scores = score_answers(
+            "black box", seed, tau, model.probabilities, parts["test"], detection
+        )
+        write_json(out, {"part": "test", "parameters": model.n_parameters()} | scores)
+        if not took:
+            timed = sorted(parts["test"].samples, key=lambda sample: sample.id)[:CROPS]
+            edge = str(max(timed[0].grid.shape))
+            took = {edge: milliseconds(model.probabilities, timed)}
+    write_json(out_times, {"training_seconds": seconds, "inference_ms": took} | used())

@@ -1,0 +1,211 @@
+"""Labelled files as a dataset, and a model from them, without the workflow."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from scenenet.core.errors import InputError
+from scenenet.core.files import read_json
+from scenenet.dataset.crops import CropSettings, cut_crops
+from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
+from scenenet.dataset.split import SplitSettings, split_crops
+from scenenet.dataset.voxel_cache import Dataset, build, load
+from scenenet.dataset.voxels import VoxelSettings
+from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.crop_towers import crop_towers
+from scenenet.evaluation.scoring import score
+from scenenet.metrics.tower_matching import TowerMatch, match_towers
+from scenenet.models.answers import probabilities
+from scenenet.models.model_file import read_model, write_model
+from scenenet.models.settings import ModelSettings, TuningSettings
+from scenenet.pointcloud.ts40k import sample_files
+from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.settings import PredictSettings
+from scenenet.training.train import card_of, fit
+from scenenet.training.tuning import choose
+
+
+@dataclass(frozen=True)
+class LabelledFiles:
+    """What labelled files hold.
+
+    Attributes:
+        dataset: their crops on grids.
+        parts: part of each crop by its id; empty where no split was asked for or possible.
+        surveys: table of labelled towers of each survey (TS40K samples are no surveys).
+        survey_crops: ids of the crops that were cut out of surveys.
+        skipped: files or samples that gave no crop, with the reason.
+    """
+
+    dataset: Dataset
+    parts: dict[str, str]
+    surveys: dict[Path, pd.DataFrame]
+    survey_crops: set[str]
+    skipped: list[dict[str, str]]
+
+
+def read_labelled(
+    paths: Sequence[str | Path],
+    codes: str,
+    grid: VoxelSettings,
+    split: SplitSettings | None = None,
+) -> LabelledFiles:
+    """Take every labelled file through towers, crops and voxels.
+
+    Args:
+        paths: surveys (cut into crops around their towers), and TS40K samples or folders of them.
+        codes: class scheme of the labels.
+        split: how to split the crops; a single crop is not split.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    surveys: dict[Path, pd.DataFrame] = {}
+    survey_crops: set[str] = set()
+    skipped: list[dict[str, str]] = []
+    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
+        crop_manifests, voxel_manifests = [], []
+        for number, path in enumerate(map(Path, paths), start=1):
+            folder = Path(scratch) / f"{number}"
+            towers = survey_towers(path, codes, TowerSettings())
+            # The number keeps files of the same name in different folders apart.
+            name = path.stem if len(paths) == 1 else f"{number}-{path.stem}"
+            crops, voxels = folder / "crops.json", folder / "voxels.json"
+            facts = cut_crops(
+                name, path, codes, towers, CropSettings(), folder / "crops.zarr.zip", crops
+            )
+            skipped += facts["skipped"]
+            if not sample_files(path):
+                surveys[path] = towers
+                survey_crops |= {entry["id"] for entry in facts["crops"]}
+                if len(towers) == 0:
+                    skipped.append({"sample": path.name, "reason": "no labelled tower in it"})
+            build(crops, grid, folder / "voxels.zarr.zip", voxels)
+            crop_manifests.append(crops)
+            voxel_manifests.append(voxels)
+        dataset = load(voxel_manifests)
+        parts = {}
+        if split is not None and len(dataset.samples) > 1:
+            table = split_crops(crop_manifests, split)
+            parts = dict(zip(table["crop"], table["part"], strict=True))
+    return LabelledFiles(dataset, parts, surveys, survey_crops, skipped)
+
+
+def train_files(
+    paths: Sequence[str | Path],
+    codes: str,
+    grid: VoxelSettings,
+    settings: ModelSettings,
+    tuning: TuningSettings,
+    seeds: Sequence[int],
+    validation: float,
+    provenance: dict[str, Any],
+    out: str | Path,
+) -> dict[str, Any]:
+    """Train with several seeds, tune each on the crops kept for validation, write the best.
+
+    Args:
+        validation: share of the crops to tune on. With a single crop, or 0, the training crops
+            themselves are used, which flatters the scores and is said in the answer.
+
+    Returns:
+        the scores of each seed, the chosen one, the numbers of crops and what was skipped.
+
+    Raises:
+        InputError: a file cannot be read, or none has a labelled tower.
+    """
+    split = SplitSettings(train=1 - validation, validation=validation, test=0, neighbour=0)
+    files = read_labelled(paths, codes, grid, split if validation > 0 else None)
+    data = files.dataset
+    _require_crops(data, paths)
+    kept = [s for s in data.samples if files.parts.get(s.id) == "validation"]
+    learnt = [s for s in data.samples if files.parts.get(s.id) != "validation"]
+    training = replace(data, samples=learnt)
+    tried = []
+    for seed in seeds:
+        model, _ = fit(learnt, kept, settings, seed)
+        card = card_of(training, settings, grid, seed, provenance)
+        tuned, card, result = choose(model, card, kept or learnt, tuning, learnt if kept else ())
+        tried.append((seed, tuned, card, result))
+    seed, tuned, card, result = max(tried, key=lambda entry: entry[3]["validation"]["f05"])
+    write_model(out, tuned, card)
+    return {
+        "model": str(out),
+        "seed": seed,
+        "tau": result["tau"],
+        "kernel_size": result["kernel_size"],
+        "tuned_on": "validation" if kept else "training",
+        "scores": result["validation"],
+        "seeds": [
+            {"seed": s, "kernel_size": r["kernel_size"], **r["validation"]} for s, _, _, r in tried
+        ],
+        "crops": {"training": len(learnt), "validation": len(kept)},
+        "skipped": files.skipped,
+    }
+
+
+def evaluate_files(
+    paths: Sequence[str | Path],
+    model: str | Path,
+    codes: str,
+    grid: VoxelSettings | None,
+    detection: DetectionSettings,
+) -> dict[str, Any]:
+    """Scores of a model on labelled files.
+
+    Args:
+        grid: the grid for the voxel scores; None for the model's own voxel size. In that case the
+            towers of surveys are looked for in the whole survey and not in crops around the true
+            ones, so that false towers anywhere count, and surveys without towers as well.
+
+    Returns:
+        as ``scenenet.evaluation.scoring.score``, with ``skipped``.
+
+    Raises:
+        InputError: a file cannot be read, or none has anything to score.
+    """
+    trained, card = read_model(model)
+    whole_surveys = grid is None
+    grid = grid or VoxelSettings(fit="metric", voxel_size=card.voxel_size)
+    files = read_labelled(paths, codes, grid)
+    if not (whole_surveys and files.surveys):
+        _require_crops(files.dataset, paths)
+    result = score(trained, card, files.dataset, detection)
+    if whole_surveys:
+        match = TowerMatch(np.empty(0), 0, 0)
+        for sample, crop in zip(files.dataset.samples, files.dataset.crops, strict=True):
+            if sample.id not in files.survey_crops:
+                probability, _ = probabilities(trained, sample, card.measurement)
+                match += crop_towers(sample, crop, probability, card.threshold(), detection)
+        for survey, towers in files.surveys.items():
+            match += _survey_towers(survey, towers, model, detection)
+        result["towers"] = match.scores()
+    return result | {"skipped": files.skipped}
+
+
+def _survey_towers(
+    survey: Path, towers: pd.DataFrame, model: str | Path, detection: DetectionSettings
+) -> TowerMatch:
+    """Towers found anywhere in a survey against its labelled ones."""
+    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
+        laz, geojson, summary = (Path(scratch) / f"p{end}" for end in (".laz", ".json", ".s.json"))
+        predict_survey(survey, model, laz, geojson, summary, PredictSettings(), detection)
+        features = read_json(geojson)["features"]
+    found = np.array([feature["geometry"]["coordinates"] for feature in features])
+    return match_towers(found, towers[["x", "y"]].to_numpy(float))
+
+
+def _require_crops(dataset: Dataset, paths: Sequence[str | Path]) -> None:
+    if not dataset.samples:
+        raise InputError(
+            "no labelled tower in it",
+            file=", ".join(str(path) for path in paths),
+            remedy="Check --codes, and that the points of towers are labelled 15",
+        )

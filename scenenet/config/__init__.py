@@ -1,0 +1,1 @@
+"""The configuration of the workflow: schema, errors, reference, survey sheet."""

@@ -1,0 +1,208 @@
+"""The configuration of the workflow: gathers the settings models, which stand beside their stages.
+
+Nothing is set here that a stage has a setting for, and reading a configuration loads no torch, so
+that a workflow can plan in a second. ``scenenet.config.reference`` writes
+the JSON schemas and the table of settings that are kept in the repository.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Annotated, Any, Self
+
+from pydantic import Field, ValidationError, model_validator
+
+from scenenet.config.errors import explain
+from scenenet.core.errors import InputError
+from scenenet.core.provenance import FULL_BELOW_BYTES
+from scenenet.core.settings import NAME, Settings
+from scenenet.dataset.crops import CropSettings
+from scenenet.dataset.labelled_towers import TowerSettings
+from scenenet.dataset.split import SplitSettings
+from scenenet.dataset.voxels import VoxelSettings
+from scenenet.detection.settings import DetectionSettings
+from scenenet.experiments.contenders import contenders
+from scenenet.experiments.cross_validation.settings import CrossValidationSettings
+from scenenet.experiments.label_noise.settings import NoiseSettings
+from scenenet.experiments.studies.settings import StudySettings
+from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
+from scenenet.pointcloud.class_schemes import Codes
+from scenenet.pointcloud.quality.check import CheckSettings
+from scenenet.prediction.settings import PredictSettings
+from scenenet.synthetic.settings import SyntheticSettings
+from scenenet.tracking.store import TrackingSettings
+
+Seed = Annotated[int, Field(ge=0)]
+
+
+class NewSurveys(Settings):
+    """The inbox: surveys that are only predicted, without a row in the sheet."""
+
+    folder: str | None = Field(
+        "surveys", description="every LAS and LAZ file in it is classified; null for no inbox"
+    )
+    codes: Codes = Field("asprs", description="class codes of these files, where they have labels")
+
+
+class SyntheticSurvey(SyntheticSettings):
+    """A synthetic survey, made as RESULTS_DIR/synthetic/NAME.laz."""
+
+    name: str = Field(pattern=NAME, description="name of its file")
+
+
+class Synthetic(Settings):
+    """Surveys made by the workflow; the sheet says which are used, and how."""
+
+    surveys: tuple[SyntheticSurvey, ...] = Field((), description="surveys that can be made")
+
+
+class Prediction(PredictSettings):
+    """How whole surveys are classified, and by which model."""
+
+    model: str = Field("scenenet", description="name of the model whose best seed predicts")
+
+
+class Config(Settings):
+    """Everything a run of the workflow can be told."""
+
+    dataset: str = Field(
+        "surveys", min_length=1, description="name of the data, in MLflow and in the report"
+    )
+    results_dir: str = Field("results", min_length=1, description="folder for every result")
+    surveys: str | None = Field(
+        "config/surveys.tsv", description="survey sheet; null where there are only TS40K samples"
+    )
+    ts40k_dir: str | None = Field(
+        None, description="folder of TS40K samples (.npy, .pt) to train on"
+    )
+    ts40k_codes: Codes = Field(
+        "edp", description="their class codes: edp, or ts40k for the six merged classes of .pt"
+    )
+    new_surveys: NewSurveys = NewSurveys()
+    content_below: int = Field(
+        FULL_BELOW_BYTES // 1024**2,
+        ge=0,
+        description="MiB; smaller surveys count as changed when their content is another one, "
+        "larger ones when size or date are, because reading them takes seconds",
+    )
+    thesis: str = Field("config/thesis.yaml", description="published numbers to stand beside ours")
+    synthetic: Synthetic = Synthetic()
+    check: CheckSettings = CheckSettings()
+    towers: TowerSettings = TowerSettings()
+    crops: CropSettings = CropSettings()
+    voxels: VoxelSettings = VoxelSettings()
+    split: SplitSettings = SplitSettings()
+    training: TrainingSettings = Field(
+        TrainingSettings(), description="of every model that does not say otherwise itself"
+    )
+    models: tuple[ModelSettings, ...] = Field(min_length=1, description="models to train")
+    seeds: tuple[Seed, ...] = Field(
+        min_length=1, description="each model is trained once from each of these"
+    )
+    tuning: TuningSettings = TuningSettings()
+    studies: tuple[StudySettings, ...] = Field(
+        (), description="many small trainings that differ in one thing; config/studies.yaml"
+    )
+    cross_validation: CrossValidationSettings = CrossValidationSettings()
+    noise: NoiseSettings = NoiseSettings()
+    detection: DetectionSettings = DetectionSettings()
+    predict: Prediction = Prediction()
+    tracking: TrackingSettings = TrackingSettings()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _common_training(cls, raw: Any) -> Any:
+        """Give every model the common training settings under its own."""
+        if not isinstance(raw, Mapping):
+            return raw
+        common, models = raw.get("training"), raw.get("models")
+        if not isinstance(common, Mapping) or not isinstance(models, list | tuple):
+            return raw
+        filled = [
+            {**model, "training": merged(common, model.get("training") or {})}
+            if isinstance(model, Mapping)
+            else model
+            for model in models
+        ]
+        return {**raw, "models": filled}
+
+    @model_validator(mode="after")
+    def _names_fit(self) -> Self:
+        for what, names in (
+            ("models", [model.name for model in self.models]),
+            ("seeds", list(self.seeds)),
+            ("synthetic.surveys", [survey.name for survey in self.synthetic.surveys]),
+            ("studies", [study.name for study in self.studies]),
+        ):
+            if twice := [str(name) for name, count in Counter(names).items() if count > 1]:
+                raise ValueError(f"{what}: {', '.join(twice)} is there more than once")
+        known = [model.name for model in self.models]
+        if self.predict.model not in known:
+            raise ValueError(
+                f"predict.model: {self.predict.model!r} is not one of the models: "
+                f"{', '.join(known)}"
+            )
+        for study in self.studies:
+            if study.model not in known:
+                raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
+            study.plans(self.model_named(study.model), self.voxels, self.split)
+        self.noise_models()
+        self.crossed_models()
+        return self
+
+    def noise_models(self) -> list[ModelSettings]:
+        """The models that are trained on wrong labels."""
+        return contenders(self.noise.contenders, self.models, "noise.contenders")
+
+    def crossed_models(self) -> list[ModelSettings]:
+        """The models that are cross-validated."""
+        told = self.cross_validation.contenders
+        return contenders(told, self.models, "cross_validation.contenders")
+
+    def contests(self) -> list[str]:
+        """Names of the contests that are held (``scenenet.experiments``)."""
+        held = {"cross_validation": self.cross_validation.leave_out, "noise": self.noise.levels}
+        return [name for name, wanted in held.items() if wanted]
+
+    def model_named(self, name: str) -> ModelSettings:
+        return next(model for model in self.models if model.name == name)
+
+    def study_named(self, name: str) -> StudySettings:
+        return next(study for study in self.studies if study.name == name)
+
+    def synthetic_named(self, name: str) -> SyntheticSettings:
+        """The settings of a synthetic survey, apart from its name."""
+        survey = next(survey for survey in self.synthetic.surveys if survey.name == name)
+        return SyntheticSettings(**survey.model_dump(exclude={"name"}))
+
+    def plain(self) -> dict[str, Any]:
+        """All settings, defaults included, as dicts, lists, texts and numbers."""
+        return self.model_dump(mode="json")
+
+
+def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
+    """Check a configuration and fill in the defaults.
+
+    Args:
+        raw: as read from YAML.
+        file: what to call it in messages.
+
+    Raises:
+        InputError: names every key that is wrong, what is wrong with it, and how to write it.
+    """
+    try:
+        return Config.model_validate(dict(raw))
+    except ValidationError as error:
+        raise InputError(explain(error, Config), file=file or "configuration") from None
+
+
+def merged(base: Mapping[str, Any], over: Any) -> Any:
+    """``over`` on top of ``base``; mappings are merged key by key, all else is replaced."""
+    if not isinstance(over, Mapping):
+        return over
+    both = dict(base)
+    for key, value in over.items():
+        inner = both.get(key)
+        both[key] = merged(inner, value) if isinstance(inner, Mapping) else value
+    return both

@@ -1,0 +1,263 @@
+"""Which surveys there are: the survey sheet, the inbox and the folder of TS40K samples."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal, cast, get_args
+
+from pydantic import Field
+
+from scenenet.core.errors import InputError
+from scenenet.core.settings import NAME, Settings
+from scenenet.pointcloud.class_schemes import SCHEMES, Codes
+
+if TYPE_CHECKING:
+    from scenenet.config.schema import Config
+
+Role = Literal["train", "new"]
+Origin = Literal["file", "synthetic", "ts40k"]
+
+
+LAS_SUFFIXES = (".las", ".laz")
+SURVEY_SUFFIXES = (*LAS_SUFFIXES, ".npy", ".pt")
+RESULTS = "{results_dir}"
+"""Stands for the result folder in a path of the sheet."""
+
+TS40K = "ts40k"
+"""Name of the survey that the folder of TS40K samples becomes."""
+
+
+class SurveyRow(Settings):
+    """A row of the survey sheet, a text file with a tab between columns."""
+
+    survey: str = Field(pattern=NAME, max_length=100, description="name, used for files")
+    path: str = Field(
+        min_length=1,
+        description="LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples; from the root "
+        f"of the project, or absolute; {RESULTS}/synthetic/NAME.laz is a synthetic survey",
+    )
+    codes: Codes = Field(description="what the class codes mean")
+    role: Role = Field(description="train: part of the dataset; new: only classified")
+
+
+COLUMNS = tuple(SurveyRow.model_fields)
+
+
+@dataclass(frozen=True)
+class Survey:
+    """A survey that the workflow works on.
+
+    Attributes:
+        name: unique; names its files.
+        path: where it is, as seen from the root of the project.
+        codes: class scheme of its labels.
+        role: train or new.
+        origin: ``file`` for one that somebody recorded, ``synthetic`` for one that the workflow
+            makes, ``ts40k`` for a folder of samples.
+    """
+
+    name: str
+    path: str
+    codes: Codes
+    role: Role
+    origin: Origin = "file"
+
+
+def read_surveys(config: Config, root: str | Path = ".") -> list[Survey]:
+    """Every survey of the sheet, the TS40K folder and the inbox, in this order.
+
+    Args:
+        config: the configuration.
+        root: what relative paths start from.
+
+    Raises:
+        InputError: something is wrong; everything that is wrong with the sheet is listed at once,
+            with the numbers of the lines.
+    """
+    root = Path(root)
+    surveys = [] if config.surveys is None else _read_sheet(config, root)
+    surveys += _ts40k(config, root)
+    surveys += _inbox(config, root, surveys)
+    names: dict[str, Survey] = {}
+    for survey in surveys:
+        if survey.name in names:
+            raise InputError(
+                f"two surveys are called {survey.name!r}: {names[survey.name].path} and "
+                f"{survey.path}",
+                remedy="Rename one of them",
+            )
+        names[survey.name] = survey
+    return surveys
+
+
+def _read_sheet(config: Config, root: Path) -> list[Survey]:
+    file = config.surveys or ""
+    try:
+        lines = (root / file).read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise InputError(
+            f"the survey sheet cannot be read ({error.strerror})",
+            file=file,
+            remedy="Name it in the configuration as surveys, or set surveys to null",
+        ) from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            "the survey sheet is not UTF-8 text", file=file, place=str(error)
+        ) from None
+    numbered = [
+        (number, [cell.strip() for cell in line.split("\t")])
+        for number, line in enumerate(lines, start=1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not numbered:
+        raise InputError(
+            "the survey sheet is empty",
+            file=file,
+            remedy=f"Its first line names the columns: {', '.join(COLUMNS)}, with tabs between",
+        )
+    (_, header), *rows = numbered
+    _check_header(header, file)
+    surveys: list[Survey] = []
+    problems: list[str] = []
+    first: dict[tuple[str, str], int] = {}
+    for number, cells in rows:
+        survey, found = _read_row(dict(zip(header, cells, strict=False)), config, root)
+        if len(cells) > len(header):
+            found.insert(0, f"{len(cells)} columns, where the first line names {len(header)}")
+        if survey is not None:
+            resolved = str((root / survey.path).resolve())
+            for what, key in (
+                (f"the name {survey.name!r}", ("name", survey.name)),
+                (f"the file {survey.path} with this role", (survey.role, resolved)),
+            ):
+                earlier = first.setdefault(key, number)
+                if earlier != number:
+                    found.append(f"{what} is on line {earlier} already")
+            surveys.append(survey)
+        problems += [f"  line {number}: {problem}" for problem in found]
+    if problems:
+        count = "one problem" if len(problems) == 1 else f"{len(problems)} problems"
+        raise InputError("\n".join([f"{count} in the survey sheet", *problems]), file=file)
+    return surveys
+
+
+def _check_header(header: list[str], file: str) -> None:
+    if len(header) == 1 and re.search(r"[,;]|\s{2,}", header[0]):
+        raise InputError(
+            "the columns of the survey sheet must be separated by tabs",
+            file=file,
+            place="line 1",
+        )
+    unknown = [name for name in header if name not in COLUMNS]
+    missing = [name for name in COLUMNS if name not in header]
+    problems = [f"column {name!r} is missing" for name in missing]
+    problems += [
+        f"column {name!r} is not known"
+        + "".join(
+            f", did you mean {near!r}?" for near in difflib.get_close_matches(name, missing, 1)
+        )
+        for name in unknown
+    ]
+    problems += [f"column {n!r} is there twice" for n in COLUMNS if header.count(n) > 1]
+    if problems:
+        raise InputError(
+            "; ".join(problems),
+            file=file,
+            place="line 1",
+            remedy=f"The columns are: {', '.join(COLUMNS)}",
+        )
+
+
+def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey | None, list[str]]:
+    """The survey of a row, or None if it cannot be made out, and all that is wrong with it."""
+    problems = [f"{name} is empty" for name in COLUMNS if not row.get(name)]
+    if problems:
+        return None, problems
+    name, codes, role = row["survey"], row["codes"], row["role"]
+    path = str(Path(row["path"].replace(RESULTS, config.results_dir)).expanduser())
+    if not re.match(NAME, name) or len(name) > 100:
+        problems.append(
+            f"survey {name!r} cannot be the name of a file: use letters, digits, '_', '-' and '.', "
+            f"such as {file_name(name)!r}"
+        )
+    problems += _unknown("codes", codes, tuple(SCHEMES))
+    problems += _unknown("role", role, get_args(Role))
+    made = {
+        str(Path(config.results_dir, "synthetic", f"{survey.name}.laz"))
+        for survey in config.synthetic.surveys
+    }
+    synthetic = path in made
+    problems += [] if synthetic else _path_problems(path, row["path"], root, config)
+    if role == "new" and (root / path).is_dir():
+        problems.append(f"{path} is a folder; samples in a folder can only be trained on")
+    origin: Origin = "synthetic" if synthetic else "file"
+    # A code or a role that is none is among the problems, with which no survey is used.
+    return Survey(name, path, cast(Codes, codes), cast(Role, role), origin), problems
+
+
+def _unknown(column: str, value: str, known: tuple[str, ...]) -> list[str]:
+    if value in known:
+        return []
+    close = difflib.get_close_matches(value.lower(), known, n=1)
+    hint = f", did you mean {close[0]!r}?" if close else ""
+    return [f"{column} {value!r} is none of {', '.join(known)}{hint}"]
+
+
+def _path_problems(path: str, written: str, root: Path, config: Config) -> list[str]:
+    where = root / path
+    if where.is_dir():
+        if any(file.suffix in (".npy", ".pt") for file in where.iterdir()):
+            return []
+        return [f"{path} is a folder without TS40K samples; LAS and LAZ files get a row each"]
+    if where.is_file():
+        if where.suffix.lower() in SURVEY_SUFFIXES:
+            return []
+        return [f"{path} is none of {', '.join(SURVEY_SUFFIXES)}"]
+    if written.startswith(RESULTS) or where.parent.name == "synthetic":
+        names = [survey.name for survey in config.synthetic.surveys]
+        close = difflib.get_close_matches(where.stem, names, n=1)
+        hint = f", did you mean {RESULTS}/synthetic/{close[0]}.laz?" if close else ""
+        return [f"{path} is not there, and no entry of synthetic.surveys makes it{hint}"]
+    if not where.parent.is_dir():
+        return [f"{path} is not there, nor is its folder"]
+    names = [file.name for file in where.parent.iterdir()]
+    close = difflib.get_close_matches(where.name, names, n=1)
+    hint = f", did you mean {Path(path).with_name(close[0])}?" if close else ""
+    return [f"{path} is not there{hint}"]
+
+
+def _ts40k(config: Config, root: Path) -> Iterator[Survey]:
+    if config.ts40k_dir is None:
+        return
+    folder = root / config.ts40k_dir
+    if not folder.is_dir() or not any(f.suffix in (".npy", ".pt") for f in folder.iterdir()):
+        raise InputError(
+            "there are no TS40K samples (.npy, .pt)",
+            file=config.ts40k_dir,
+            remedy="Name their folder, for example with --config ts40k_dir=FOLDER",
+        )
+    yield Survey(TS40K, config.ts40k_dir, config.ts40k_codes, "train", "ts40k")
+
+
+def _inbox(config: Config, root: Path, known: list[Survey]) -> Iterator[Survey]:
+    """LAS and LAZ files of the inbox that the sheet does not name. Hidden files are passed over:
+    programs that copy write to one until they have finished."""
+    if config.new_surveys.folder is None or not (root / config.new_surveys.folder).is_dir():
+        return
+    listed = {(root / survey.path).resolve() for survey in known}
+    for file in sorted((root / config.new_surveys.folder).iterdir()):
+        if file.name.startswith(".") or file.suffix.lower() not in LAS_SUFFIXES:
+            continue
+        if file.resolve() not in listed:
+            path = str(Path(config.new_surveys.folder) / file.name)
+            stem = file.stem.removesuffix(".copc")
+            yield Survey(file_name(stem), path, config.new_surveys.codes, "new")
+
+
+def file_name(text: str) -> str:
+    """``text`` as it can stand in a file name: letters, digits, '_', '-' and '.'."""
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("_.-")[:100] or "survey"

@@ -1,0 +1,160 @@
+"""The occupancy convolution: the one hot loop of the project (thesis 4.1).
+
+A voxel grid is 1-2 % full, so it is kept as the list of its occupied voxels, and each occupied
+voxel adds the kernel, mirrored about its anchor, to the output around it. That is the same sum as
+``torch.nn.functional.conv3d(padding="same")`` on the dense grid, in another order:
+
+    out[p] = sum_q kernel[q] * x[p + q - a],   a = (k - 1) // 2 on each axis
+
+with x = 0 outside the grid. An even kernel reaches one voxel further up each axis than down.
+``docs/performance.md`` tells how fast it is and why. A kernel on a GPU is convolved there, densely.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import torch
+from torch import Tensor
+
+from scenenet.convolution.compiled.kernel_tables import kernel_of, lanes_of, table_of
+from scenenet.convolution.compiled.options import TASKS, first_plane
+from scenenet.convolution.compiled.planes import gather_plane, layout, sum_plane
+from scenenet.convolution.compiled.runs import RUN
+from scenenet.convolution.dense import convolve_dense
+from scenenet.convolution.occupancy import Occupancy, Shape
+from scenenet.core.compilation import COMPILED
+
+
+def convolve(occupancy: Occupancy, kernel: Tensor) -> Tensor:
+    """Convolve each grid with ``kernel``; differentiable in the kernel.
+
+    The observer is linear (thesis Eq. 4.1), so the weighted sum of kernels is convolved once, and
+    the volumes of the single ones need not be made.
+
+    Args:
+        occupancy: B grids of shape (D, H, W).
+        kernel: (kz, ky, kx), or K of them as (K, kz, ky, kx), float32 or float64, any size, odd or
+            even.
+
+    Returns:
+        (B, D, H, W), or (K, B, D, H, W), of the kernel's dtype and on its device.
+    """
+    if kernel.dim() == 4:
+        return torch.stack([convolve(occupancy, one) for one in kernel])
+    if kernel.is_cuda:
+        return convolve_dense(occupancy, kernel)
+    return _Convolution.apply(kernel, occupancy)
+
+
+def convolve_at_voxels(occupancy: Occupancy, kernels: Tensor) -> Tensor:
+    """What ``convolve`` answers at the occupied voxels, without a volume; no gradient.
+
+    Args:
+        kernels: (K, kz, ky, kx), float32 or float64, on the CPU.
+
+    Returns:
+        (K, M), in the order of ``occupancy.index``.
+    """
+    weights = np.ascontiguousarray(kernels.detach().numpy())
+    out = np.empty((len(weights), len(occupancy.index)), weights.dtype)
+    rows = _plane_rows(occupancy)
+    for k, kernel in enumerate(weights):
+        table = table_of(kernel)
+        _pick(occupancy.runs, table, kernel.shape[2], occupancy.index, rows, out[k])
+    return torch.from_numpy(out)
+
+
+class _Convolution(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx, kernel: Tensor, occupancy: Occupancy) -> Tensor:
+        ctx.occupancy = occupancy
+        ctx.kernel_size = tuple(kernel.shape)
+        weights = np.ascontiguousarray(kernel.detach().numpy())
+        out = np.empty((len(occupancy), *occupancy.shape), weights.dtype)
+        _scatter(occupancy.runs, table_of(weights), weights.shape[2], out)
+        return torch.from_numpy(out)
+
+    @staticmethod
+    def backward(ctx, upstream: Tensor) -> tuple[Tensor, None]:
+        return convolution_gradient(ctx.occupancy, upstream, ctx.kernel_size), None
+
+
+def convolution_gradient(occupancy: Occupancy, upstream: Tensor, size: Shape) -> Tensor:
+    """Gradient of sum(upstream * convolve(occupancy, kernel)) with respect to the kernel.
+
+    Args:
+        upstream: (B, D, H, W), float32 or float64, on the CPU.
+        size: (kz, ky, kx) of the kernel.
+    """
+    dense = np.ascontiguousarray(upstream.numpy())
+    tables = np.zeros((TASKS, *table_shape(size)), dense.dtype)
+    _gather(occupancy.runs, dense, size[2], tables)
+    return torch.from_numpy(kernel_of(tables, size[2]))
+
+
+def table_shape(size: Shape) -> tuple[int, int, int, int]:
+    """Shape of the table of a kernel of ``size`` (see
+    ``scenenet.convolution.compiled.kernel_tables``)."""
+    kz, ky, kx = size
+    return kz, 1 << RUN, ky, lanes_of(kx)
+
+
+@numba.njit(parallel=True, **COMPILED)
+def _scatter(runs, table, kx, out):  # pragma: no cover - compiled
+    """out[b, z] = the plane, for each plane of the batch."""
+    depth, height, width = runs.shape
+    n_rows, length, above, left = layout(table, kx, height, width)
+    for task in numba.prange(TASKS):
+        buffer = np.empty(n_rows * length, table.dtype)
+        reached = np.empty(height, np.bool_)
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
+            plane = out[p // depth, p % depth]
+            if not sum_plane(p, runs, table, buffer, length, reached):
+                plane[:] = 0
+                continue
+            for y in range(height):
+                begin = (y + above) * length + left
+                for x in range(width):
+                    plane[y, x] = buffer[begin + x]
+
+
+@numba.njit(parallel=True, **COMPILED)
+def _gather(runs, upstream, kx, tables):  # pragma: no cover - compiled
+    """tables[task] += gradient of the table from the planes of a task."""
+    depth, height, width = runs.shape
+    n_rows, length, above, left = layout(tables[0], kx, height, width)
+    for task in numba.prange(TASKS):
+        buffer = np.zeros(n_rows * length, tables.dtype)
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
+            plane = upstream[p // depth, p % depth]
+            for y in range(height):
+                begin = (y + above) * length + left
+                for x in range(width):
+                    buffer[begin + x] = plane[y, x]
+            gather_plane(p, runs, buffer, length, tables[task])
+
+
+@numba.njit(parallel=True, **COMPILED)
+def _pick(runs, table, kx, index, rows, out):  # pragma: no cover - compiled
+    """out[i] = the answer at voxel i; only planes with an occupied voxel are summed up."""
+    depth, height, width = runs.shape
+    n_rows, length, above, left = layout(table, kx, height, width)
+    for task in numba.prange(TASKS):
+        buffer = np.empty(n_rows * length, table.dtype)
+        reached = np.empty(height, np.bool_)
+        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
+            if rows[p] == rows[p + 1]:
+                continue
+            sum_plane(p, runs, table, buffer, length, reached)
+            for i in range(rows[p], rows[p + 1]):
+                within = index[i] - (p % depth) * height * width
+                y = within // width
+                out[i] = buffer[(y + above) * length + left + within - y * width]
+
+
+def _plane_rows(occupancy: Occupancy) -> np.ndarray:
+    """(B * D + 1,) int64: the voxels of plane p are rows [p] to [p + 1] of ``index``."""
+    depth, height, width = occupancy.shape
+    starts = np.arange(len(occupancy) * depth + 1) * height * width
+    return np.searchsorted(occupancy.flat(), starts)

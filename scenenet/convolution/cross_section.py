@@ -1,0 +1,100 @@
+"""The strongest answer in a voxel's section of a tower.
+
+A kernel answers on the axis of a tower, and a tower is wider than its axis. So the answer for an
+occupied voxel is the strongest among the occupied voxels within a radius in plan and some way up.
+Taking a maximum moves with the scene and brings no two answers further apart: it is itself a GENEO
+(thesis 3.4), and so is what it makes of another.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from scenenet.convolution.occupancy import Occupancy
+from scenenet.core.compilation import COMPILED
+
+FLOOR_ROUNDING = 1e-6
+"""What a length may miss a whole number of voxels by."""
+
+
+def whole_voxels(length: float, voxel_size: float) -> int:
+    """Voxels that fit into ``length`` m."""
+    return int(length / voxel_size + FLOOR_ROUNDING)
+
+
+def section_offsets(radius: float, above: float, voxel_size: float) -> np.ndarray:
+    """(S, 3) int64 offsets (z, y, x) of the voxels of a section, itself first.
+
+    Args:
+        radius: m, in plan.
+        above: m.
+        voxel_size: m.
+    """
+    wide, high = whole_voxels(radius, voxel_size), whole_voxels(above, voxel_size)
+    side = np.arange(-wide, wide + 1)
+    z, y, x = np.meshgrid(np.arange(high + 1), side, side, indexing="ij")
+    squared = (y**2 + x**2) * voxel_size**2
+    inside = squared <= (radius + FLOOR_ROUNDING) ** 2
+    offsets = np.stack([z[inside], y[inside], x[inside]], axis=1)
+    return offsets[np.argsort((offsets**2).sum(axis=1), kind="stable")].astype(np.int64)
+
+
+def neighbours(occupancy: Occupancy, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The occupied voxels in the section of each.
+
+    Args:
+        offsets: as ``section_offsets`` has them.
+
+    Returns:
+        starts (M + 1,) int64 and rows (N,) int32: those of voxel i are
+        ``rows[starts[i] : starts[i + 1]]``, itself first.
+    """
+    starts = np.zeros(len(occupancy.index) + 1, np.int64)
+    if len(occupancy.index) == 0:
+        return starts, np.empty(0, np.int32)
+    arguments = (occupancy.index, occupancy.offsets, occupancy.shape, offsets)
+    _find(*arguments, starts, np.empty(0, np.int32), False)
+    rows = np.empty(int(starts[-1]), np.int32)
+    _find(*arguments, starts, rows, True)
+    return starts, rows
+
+
+@numba.njit(**COMPILED)
+def strongest(answers, starts, rows):  # pragma: no cover - compiled
+    """(M,) int32 row of the highest of ``answers`` (M,) in each section; the nearest of equals."""
+    out = np.empty(len(answers), np.int32)
+    for i in range(len(answers)):
+        best = rows[starts[i]]
+        for k in range(starts[i] + 1, starts[i + 1]):
+            if answers[rows[k]] > answers[best]:
+                best = rows[k]
+        out[i] = best
+    return out
+
+
+@numba.njit(**COMPILED)
+def _find(index, grids, shape, offsets, starts, rows, fill):  # pragma: no cover - compiled
+    """Count the neighbours of each voxel into ``starts``, or write them into ``rows``."""
+    depth, height, width = shape
+    row_of = np.full(depth * height * width, -1, np.int32)
+    for b in range(len(grids) - 1):
+        for i in range(grids[b], grids[b + 1]):
+            row_of[index[i]] = i
+        for i in range(grids[b], grids[b + 1]):
+            z = index[i] // (height * width)
+            y = index[i] // width % height
+            x = index[i] % width
+            at = starts[i]
+            for k in range(len(offsets)):
+                a, b_, c = z + offsets[k, 0], y + offsets[k, 1], x + offsets[k, 2]
+                if a < depth and 0 <= b_ < height and 0 <= c < width:
+                    row = row_of[(a * height + b_) * width + c]
+                    if row >= 0:
+                        if fill:
+                            rows[at] = row
+                        at += 1
+            if not fill:
+                starts[i + 1] = at
+        for i in range(grids[b], grids[b + 1]):
+            row_of[index[i]] = -1

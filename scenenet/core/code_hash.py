@@ -1,0 +1,254 @@
+"""A digest of the code behind a script, which changes when its result could and not when it cannot.
+
+Snakemake sees the date of a script and nothing of what it imports. This sees all of the package
+that a script uses, by content, and overlooks comments, docstrings and layout.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.util import find_spec, resolve_name
+from pathlib import Path
+
+from scenenet.core.errors import InputError
+from scenenet.core.files import digest, sha256
+
+Use = tuple[str, str | None]
+"""A module and the name that is used of it; None where the module as a whole is."""
+
+_TYPE_CHECKING = frozenset({"TYPE_CHECKING", "typing.TYPE_CHECKING"})
+_COMPILED = frozenset({".py", ".pyc", ".pyo", ".so", ".nbc", ".nbi"})
+
+
+def code_hash(entry_files: Iterable[str | Path], package: str = "scenenet") -> str:
+    """Digest of some scripts and of all code of ``package`` that they use, near or far.
+
+    - Imports inside functions count as those at the top; those under ``if TYPE_CHECKING`` never
+      run and do not. A script also counts the scripts beside it that it imports.
+    - Of a module the syntax tree counts, without docstrings.
+    - An ``__init__`` that does nothing but import names from elsewhere is looked through: who
+      imports one of its names uses the module which that name is from, and not all the others.
+    - The files of a package that are not code, such as templates, count with each of its modules.
+    - A module that finds its neighbours with ``pkgutil`` counts all code in its folder and below.
+    - Other libraries do not count.
+
+    Raises:
+        InputError: a file is missing or is not Python.
+    """
+    return digest([[name, content] for name, content in sorted(used_code(entry_files, package))])
+
+
+def used_code(entry_files: Iterable[str | Path], package: str = "scenenet") -> set[tuple[str, str]]:
+    """(name, digest) of every script, module and data file that ``code_hash`` is made from."""
+    used: set[tuple[str, str]] = set()
+    waiting: list[Use] = []
+    for file in _scripts(entry_files, package):
+        source = _read(file, None, package)
+        used.add((file.name, source.digest))
+        waiting += source.uses
+    done: set[Use] = set()
+    while waiting:
+        use = waiting.pop()
+        if use in done:
+            continue
+        done.add(use)
+        parts, more = _resolve(use, package)
+        used |= parts
+        waiting += more
+    return used
+
+
+def _scripts(entry_files: Iterable[str | Path], package: str) -> set[Path]:
+    """The entry files and the scripts beside them that they import."""
+    found: set[Path] = set()
+    waiting = [Path(entry).resolve() for entry in entry_files]
+    while waiting:
+        file = waiting.pop()
+        if file not in found:
+            found.add(file)
+            waiting += _read(file, None, package).beside
+    return found
+
+
+def _resolve(use: Use, package: str) -> tuple[set[tuple[str, str]], list[Use]]:
+    """What using a name of a module adds, and what it uses in turn."""
+    module, name = use
+    file = _locate(module)
+    if file is None:
+        return set(), []
+    source = _read(file, module, package)
+    # Importing a.b.c runs a and a.b first, which matters where they do more than hand names on.
+    parent = module.rpartition(".")[0]
+    more: list[Use] = []
+    if parent and not _source_of(parent, package).only_imports:
+        more.append((parent, None))
+    if name is not None:
+        if _locate(f"{module}.{name}") is not None:
+            more.append((f"{module}.{name}", None))
+            if source.only_imports:
+                return set(), more
+        elif source.only_imports and name in source.exports:
+            return set(), [*more, source.exports[name]]
+    holder = file.parent
+    data = {(f"{holder.name}/{p.relative_to(holder)}", sha256(p)) for p in _data_files(holder)}
+    return {(module, source.digest)} | data, [*more, *source.uses]
+
+
+@dataclass(frozen=True)
+class _Source:
+    """One file of Python.
+
+    Attributes:
+        digest: of what it does.
+        uses: what it imports of the package.
+        only_imports: whether it is an ``__init__`` that only imports names.
+        exports: name -> where it is from, in such an ``__init__``.
+        beside: scripts in the folder of a script that it imports.
+    """
+
+    digest: str
+    uses: tuple[Use, ...]
+    only_imports: bool = False
+    exports: dict[str, Use] = field(default_factory=dict)
+    beside: tuple[Path, ...] = ()
+
+
+def _source_of(module: str, package: str) -> _Source:
+    file = _locate(module)
+    return _Source("", (), True) if file is None else _read(file, module, package)
+
+
+@cache
+def _locate(name: str) -> Path | None:
+    """File of a module, found without running any of its package but the topmost."""
+    top, _, rest = name.partition(".")
+    spec = find_spec(top)
+    if spec is None or spec.origin is None:
+        return None
+    root = Path(spec.origin).parent
+    base = root.joinpath(*rest.split(".")) if rest else root
+    if (base / "__init__.py").is_file():
+        return base / "__init__.py"
+    file = base.with_suffix(".py")
+    return file if rest and file.is_file() else None
+
+
+@cache
+def _read(file: Path, name: str | None, package: str) -> _Source:
+    """A file; ``name`` is None for a script outside the package.
+
+    Cached: a process sees one state of the code, as it does when it imports it.
+    """
+    try:
+        tree = ast.parse(file.read_bytes(), filename=str(file))
+    except OSError as error:
+        raise InputError(f"cannot be read ({error.strerror})", file=file) from None
+    except SyntaxError as error:
+        place = f"line {error.lineno}"
+        raise InputError(f"is not Python ({error.msg})", file=file, place=place) from None
+    is_package = file.name == "__init__.py"
+    inside = name if is_package else (name or "").rpartition(".")[0]
+    imports = list(_imports(tree, inside or ""))
+    tops = {module for _, module, _ in imports}
+    uses = {(module, used) for _, module, used in imports if _within(module, package)}
+    if name is not None and "pkgutil" in {module.partition(".")[0] for module in tops}:
+        uses |= _all_modules(file.parent, inside or "")
+    _strip_docstrings(tree)
+    beside = [file.with_name(f"{module}.py") for module in sorted(tops)] if name is None else []
+    return _Source(
+        hashlib.sha256(ast.unparse(tree).encode()).hexdigest(),
+        tuple(sorted(uses, key=str)),
+        is_package and all(_is_import(statement) for statement in tree.body),
+        {bound: (module, used) for bound, module, used in imports if _within(module, package)},
+        tuple(script for script in beside if script.is_file()),
+    )
+
+
+def _within(module: str, package: str) -> bool:
+    return module == package or module.startswith(f"{package}.")
+
+
+def _imports(tree: ast.AST, inside: str) -> Iterator[tuple[str, str, str | None]]:
+    """(name it is bound to, module, name in the module) of every import that may run.
+
+    ``inside`` is the package that relative names are relative to.
+    """
+    for node in _executed(tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield alias.asname or alias.name, alias.name, None
+        elif isinstance(node, ast.ImportFrom):
+            source = "." * node.level + (node.module or "")
+            if node.level and not inside:
+                continue  # a script has no package; Python would refuse it as well
+            module = resolve_name(source, inside) if node.level else source
+            for alias in node.names:
+                used = None if alias.name == "*" else alias.name
+                yield alias.asname or alias.name, module, used
+
+
+def _executed(node: ast.AST) -> Iterator[ast.AST]:
+    """All nodes below ``node`` but the bodies of ``if TYPE_CHECKING``."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and ast.unparse(child.test) in _TYPE_CHECKING:
+            for statement in child.orelse:
+                yield statement
+                yield from _executed(statement)
+            continue
+        yield child
+        yield from _executed(child)
+
+
+def _is_import(statement: ast.stmt) -> bool:
+    """Whether a statement of an ``__init__`` only imports names, or lists them in ``__all__``."""
+    if isinstance(statement, ast.Assign):
+        return [ast.unparse(target) for target in statement.targets] == ["__all__"]
+    if isinstance(statement, ast.ImportFrom):
+        return all(alias.name != "*" for alias in statement.names)
+    return isinstance(statement, ast.Pass)
+
+
+def _strip_docstrings(tree: ast.Module) -> None:
+    """Take out texts that stand alone as a statement: docstrings of modules, classes, functions
+    and attributes."""
+    for node in ast.walk(tree):
+        for part in ("body", "orelse", "finalbody"):
+            statements = getattr(node, part, None)
+            if isinstance(statements, list):
+                kept = [s for s in statements if not _is_text(s)]
+                # The body of a function must hold something; other parts need not.
+                empty = [ast.Pass()] if statements and part == "body" else []
+                setattr(node, part, kept or empty)
+
+
+def _is_text(statement: ast.stmt) -> bool:
+    return (
+        isinstance(statement, ast.Expr)
+        and isinstance(statement.value, ast.Constant)
+        and isinstance(statement.value.value, str)
+    )
+
+
+def _all_modules(folder: Path, name: str) -> set[Use]:
+    files = folder.rglob("*.py")
+    parts = (file.relative_to(folder).with_suffix("").parts for file in files)
+    return {(".".join([name, *(p for p in path if p != "__init__")]), None) for path in parts}
+
+
+@cache
+def _data_files(folder: Path) -> tuple[Path, ...]:
+    """Files of a package that are not code: its own and those of folders that are no packages."""
+    found: list[Path] = []
+    for path in sorted(folder.iterdir()):
+        if path.name.startswith((".", "__pycache__")):
+            continue
+        if path.is_dir():
+            if not any(path.glob("*.py")):
+                found += _data_files(path)
+        elif path.suffix not in _COMPILED:
+            found.append(path)
+    return tuple(found)

@@ -1,0 +1,171 @@
+"""The ancillary dataset: the surroundings of each tower (thesis 5.1.3, Figure 5.3)."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from pydantic import Field
+
+from scenenet.core.progress import track
+from scenenet.core.settings import Settings
+from scenenet.dataset.zarr_store import StoreReader, create
+from scenenet.pointcloud import iter_chunks, read
+from scenenet.pointcloud.class_schemes import class_scheme
+from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.ts40k import sample_files
+
+_RECORD = np.dtype([("xyz", "<f8", 3), ("classification", "u1")])
+
+
+class CropSettings(Settings):
+    """How much of the surroundings a crop takes."""
+
+    radius_in_heights: float = Field(
+        1.0, gt=0, description="planar radius of a crop, in heights of its tower (thesis: 1)"
+    )
+
+
+@dataclass(frozen=True)
+class Crop:
+    """One sample of the dataset.
+
+    Attributes:
+        id: unique name, SURVEY-NUMBER or SURVEY-SAMPLE.
+        x, y: centre of its tower, m.
+        radius: planar radius, m.
+        towers: (T, 2) centres of all true towers in the crop, m.
+    """
+
+    id: str
+    x: float
+    y: float
+    radius: float
+    towers: np.ndarray
+
+
+def cut_crops(
+    survey: str,
+    path: str | Path,
+    codes: str,
+    towers: pd.DataFrame,
+    settings: CropSettings,
+    store: str | Path,
+    manifest: str | Path,
+) -> dict[str, Any]:
+    """Write every point within one tower height (planar) of each tower.
+
+    The survey is read once, chunk by chunk, and the crops grow on disk, so memory is bounded by a
+    chunk and a crop. TS40K samples are crops already and are taken as they are.
+
+    Args:
+        survey: name of the survey, the first part of each crop's id.
+        towers: table of ``scenenet.dataset.labelled_towers``.
+
+    Returns:
+        the manifest: ``crops`` has an entry for each; ``skipped`` says which samples were left
+        out, and why.
+    """
+    facts: dict[str, Any] = {"survey": survey, "codes": codes, "crops": [], "skipped": []}
+    samples = sample_files(path)
+    clouds = (
+        _samples(survey, samples, codes, towers, settings, facts["skipped"])
+        if samples
+        else _cut(survey, path, codes, towers, settings)
+    )
+    with create(store, manifest, facts) as writer:
+        for crop, cloud in clouds:
+            writer.add(crop.id, {"xyz": cloud.xyz, "classification": cloud.classification})
+            facts["crops"].append(_entry(crop, len(cloud)))
+    return facts
+
+
+def read_crops(manifest: str | Path) -> Iterator[tuple[Crop, PointCloud]]:
+    """The crops of a store, one at a time; the CRS stays with the survey."""
+    reader = StoreReader(manifest)
+    scheme = class_scheme(reader.manifest["codes"])
+    for entry in reader.manifest["crops"]:
+        arrays = reader.get(entry["id"])
+        cloud = PointCloud(arrays["xyz"], arrays["classification"], scheme)
+        yield crop_of(entry), cloud
+
+
+def crop_of(entry: dict[str, Any]) -> Crop:
+    """The crop that an entry of a manifest describes."""
+    towers = np.asarray(entry["towers"], float).reshape(-1, 2)
+    return Crop(entry["id"], entry["x"], entry["y"], entry["radius"], towers)
+
+
+def _entry(crop: Crop, points: int) -> dict[str, Any]:
+    return {
+        "id": crop.id,
+        "x": crop.x,
+        "y": crop.y,
+        "radius": crop.radius,
+        "towers": crop.towers.tolist(),
+        "points": points,
+    }
+
+
+def _cut(
+    survey: str, path: str | Path, codes: str, towers: pd.DataFrame, settings: CropSettings
+) -> Iterator[tuple[Crop, PointCloud]]:
+    centres = towers[["x", "y"]].to_numpy(float)
+    radii = towers["height"].to_numpy(float) * settings.radius_in_heights
+    scheme = class_scheme(codes)
+    with tempfile.TemporaryDirectory() as folder:
+        spools = [Path(folder) / f"{number}" for number in towers["tower"]]
+        for spool in spools:
+            spool.touch()
+        for chunk in track(iter_chunks(path, codes), f"{survey}: chunks read"):
+            for centre, radius, spool in zip(centres, radii, spools, strict=True):
+                _append(spool, chunk, centre, radius)
+        for number, centre, radius, spool in zip(
+            towers["tower"], centres, radii, spools, strict=True
+        ):
+            records = np.fromfile(spool, _RECORD)
+            inside = np.linalg.norm(centres - centre, axis=1) <= radius
+            x, y = centre.tolist()
+            crop = Crop(f"{survey}-{number:04d}", x, y, float(radius), centres[inside])
+            xyz = np.ascontiguousarray(records["xyz"])
+            yield crop, PointCloud(xyz, records["classification"].copy(), scheme)
+
+
+def _append(spool: Path, chunk: PointCloud, centre: np.ndarray, radius: float) -> None:
+    """Add the points of ``chunk`` within the crop to its file."""
+    offset = chunk.xyz[:, :2] - centre
+    # The square first: most chunks are far away, and two comparisons rule them out.
+    near = np.flatnonzero((np.abs(offset) <= radius).all(axis=1))
+    near = near[(offset[near] ** 2).sum(axis=1) <= radius**2]
+    if len(near) == 0:
+        return
+    records = np.empty(len(near), _RECORD)
+    records["xyz"] = chunk.xyz[near]
+    records["classification"] = chunk.classification[near]
+    with spool.open("ab") as stream:
+        stream.write(records.tobytes())
+
+
+def _samples(
+    survey: str,
+    samples: list[Path],
+    codes: str,
+    towers: pd.DataFrame,
+    settings: CropSettings,
+    skipped: list[dict[str, str]],
+) -> Iterator[tuple[Crop, PointCloud]]:
+    for sample in track(samples, f"{survey}: samples"):
+        cloud = read(sample, codes)
+        found = towers[towers["sample"] == sample.stem]
+        if len(found) == 0:
+            skipped.append({"sample": sample.name, "reason": "no tower found in it"})
+            continue
+        main = found.loc[found["points"].idxmax()]
+        radius = float(main["height"]) * settings.radius_in_heights
+        centres = found[["x", "y"]].to_numpy(float)
+        yield Crop(f"{survey}-{sample.stem}", main["x"], main["y"], radius, centres), cloud

@@ -1,0 +1,99 @@
+"""The voxel cache: the grids of a survey's crops, computed once (thesis 5.1.4)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from scenenet.core.errors import InputError
+from scenenet.core.progress import track
+from scenenet.dataset.crops import Crop, crop_of, read_crops
+from scenenet.dataset.voxels import VoxelGrid, VoxelSample, VoxelSettings, voxelise
+from scenenet.dataset.zarr_store import StoreReader, create
+
+
+def build(
+    crops: str | Path, settings: VoxelSettings, store: str | Path, manifest: str | Path
+) -> dict[str, Any]:
+    """Voxelise every crop of a survey.
+
+    Args:
+        crops: manifest of the survey's crops.
+
+    Returns:
+        the manifest: an entry a crop with its grid, the number of occupied and tower voxels and
+        the seconds that it took.
+    """
+    reader = StoreReader(crops)
+    facts: dict[str, Any] = {
+        "survey": reader.manifest["survey"],
+        "codes": reader.manifest["codes"],
+        "grid": settings.model_dump(),
+        "samples": [],
+    }
+    entries = {entry["id"]: entry for entry in reader.manifest["crops"]}
+    label = f"{facts['survey']}: voxels {settings.label}"
+    with create(store, manifest, facts) as writer:
+        for crop, cloud in track(read_crops(crops), label, total=len(entries)):
+            begin = time.perf_counter()
+            sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id)
+            seconds = time.perf_counter() - begin
+            arrays = {"index": sample.index, "count": sample.count, "tower": sample.tower}
+            writer.add(crop.id, arrays)
+            facts["samples"].append(
+                entries[crop.id]
+                | {
+                    "origin": list(sample.grid.origin),
+                    "voxel_size": sample.grid.voxel_size,
+                    "shape": list(sample.grid.shape),
+                    "occupied": len(sample.index),
+                    "tower": int(sample.tower.sum()),
+                    "seconds": seconds,
+                }
+            )
+    return facts
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Voxel samples with the crops they were made from.
+
+    Attributes:
+        samples, crops: of the same length, in the same order.
+        codes: class scheme of the labels; several are joined by ``+``.
+        content: digests of the stores the samples came from.
+    """
+
+    samples: list[VoxelSample]
+    crops: list[Crop]
+    codes: str
+    content: list[str]
+
+
+def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Dataset:
+    """Read samples back; all of them, or those with ``ids``.
+
+    Raises:
+        InputError: a store does not match its manifest, or a crop with one of ``ids`` is in none.
+    """
+    samples, crops, contents, codes = [], [], [], set()
+    for path in manifests:
+        reader = StoreReader(path)
+        contents.append(reader.manifest["content"])
+        codes.add(reader.manifest["codes"])
+        for entry in reader.manifest["samples"]:
+            if ids is not None and entry["id"] not in ids:
+                continue
+            grid = VoxelGrid(tuple(entry["origin"]), entry["voxel_size"], tuple(entry["shape"]))
+            samples.append(VoxelSample(entry["id"], grid, **reader.get(entry["id"])))
+            crops.append(crop_of(entry))
+    if ids is not None and (missing := ids - {sample.id for sample in samples}):
+        raise InputError(
+            f"{len(missing)} crops of the split are in no store: {', '.join(sorted(missing)[:5])}",
+            file=", ".join(str(path) for path in manifests),
+            remedy="Run the split again, and voxelise all of its surveys",
+        )
+    return Dataset(samples, crops, "+".join(sorted(codes)), contents)

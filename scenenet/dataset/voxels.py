@@ -1,0 +1,173 @@
+"""From points to voxels: the grid, the measurement phi and the ground truth (thesis 4.2, 5.1.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from scenenet.core.errors import InputError
+from scenenet.core.settings import Settings
+from scenenet.pointcloud.cloud import PointCloud
+
+Fit = Literal["cube", "metric"]
+
+MAX_VOXELS = 2**28
+"""Voxels of the largest grid, 16 times that of 256^3: its probabilities take 1 GiB."""
+
+
+class VoxelSettings(Settings):
+    """How a crop becomes a grid."""
+
+    fit: Fit = Field(
+        "cube",
+        description="cube: resolution^3 voxels over the bounding cube of the crop, as the thesis; "
+        "metric: as many voxels of voxel_size as the crop needs",
+    )
+    resolution: Literal[32, 64, 128, 256] = Field(64, description="voxels an edge, for fit cube")
+    voxel_size: float = Field(1.0, gt=0, description="edge of a voxel in m, for fit metric")
+
+    def grid(self, xyz: np.ndarray) -> VoxelGrid:
+        """The grid for points (N, 3)."""
+        if self.fit == "cube":
+            return VoxelGrid.cube(xyz, self.resolution)
+        return VoxelGrid.metric(xyz, self.voxel_size)
+
+    @property
+    def label(self) -> str:
+        """A name for folders: cube-64, metric-0.9m."""
+        return f"cube-{self.resolution}" if self.fit == "cube" else f"metric-{self.voxel_size:g}m"
+
+
+@dataclass(frozen=True)
+class VoxelGrid:
+    """A regular grid of cubic voxels in map coordinates.
+
+    Attributes:
+        origin: (x, y, z) m, the lowest corner.
+        voxel_size: m, edge of a voxel.
+        shape: (nz, ny, nx) voxels.
+    """
+
+    origin: tuple[float, float, float]
+    voxel_size: float
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def cube(cls, xyz: np.ndarray, resolution: int) -> VoxelGrid:
+        """resolution^3 voxels over the bounding cube: the bounding box, each side widened about
+        its middle to the longest one, which sets the voxel (the published code does the same).
+
+        Raises:
+            InputError: there are no points, or they all lie at one place.
+        """
+        low, high = _bounds(xyz)
+        side = float((high - low).max())
+        if side <= 0:
+            raise InputError("all points lie at one place, so no cube can be laid over them")
+        origin = (low + high - side) / 2
+        return cls(tuple(origin.tolist()), side / resolution, (resolution,) * 3)
+
+    @classmethod
+    def metric(cls, xyz: np.ndarray, voxel_size: float) -> VoxelGrid:
+        """As many voxels of ``voxel_size`` as the points need, centred on their bounding box.
+
+        Raises:
+            InputError: there are no points, or they are too far apart.
+        """
+        low, high = _bounds(xyz)
+        counts = np.maximum(1, np.ceil((high - low) / voxel_size)).astype(int)
+        if np.prod(counts.astype(float)) > MAX_VOXELS:
+            extent = " x ".join(f"{side:.0f}" for side in high - low)
+            raise InputError(
+                f"points over {extent} m need more than {MAX_VOXELS} voxels of {voxel_size:g} m",
+                remedy="Remove stray points, or take larger voxels",
+            )
+        origin = (low + high - counts * voxel_size) / 2
+        return cls(tuple(origin.tolist()), float(voxel_size), tuple(counts[::-1].tolist()))
+
+    @property
+    def n_voxels(self) -> int:
+        return int(np.prod(self.shape))
+
+    def voxel_of(self, xyz: np.ndarray) -> np.ndarray:
+        """(N,) int64 flat C-order [z, y, x] index of the voxel of each point.
+
+        Points on the upper border belong to the last voxel; others outside are clipped to the
+        border, which happens through rounding alone where the grid was made for these points.
+        """
+        from scenenet.dataset.voxel_counts import voxel_of
+
+        nz, ny, nx = self.shape
+        return voxel_of(xyz, np.asarray(self.origin, float), self.voxel_size, nz, ny, nx)
+
+    def centres(self, index: np.ndarray) -> np.ndarray:
+        """(M, 3) xyz, m, of the middle of the voxels at flat ``index`` (M,)."""
+        z, y, x = np.unravel_index(index, self.shape)
+        return np.asarray(self.origin) + (np.stack([x, y, z], axis=1) + 0.5) * self.voxel_size
+
+
+@dataclass(frozen=True)
+class VoxelSample:
+    """A crop on its grid: only the occupied voxels are kept, since all others are empty.
+
+    Attributes:
+        id: name of the crop.
+        grid: where the voxels lie.
+        index: (M,) int32, flat C-order positions of the occupied voxels, ascending.
+        count: (M,) int32, points in each.
+        tower: (M,) bool, whether any of them is labelled tower: the ground truth.
+    """
+
+    id: str
+    grid: VoxelGrid
+    index: np.ndarray
+    count: np.ndarray
+    tower: np.ndarray
+
+    def phi(self, measurement: Measurement) -> np.ndarray:
+        """The measurement at the occupied voxels, (M,) float32 in [0, 1] (thesis 4.2.2, 5.3.2).
+
+        presence: 1 where there is any point. density: points in relation to the fullest voxel.
+        """
+        if measurement == "presence":
+            return np.ones(len(self.index), np.float32)
+        return (self.count / self.count.max()).astype(np.float32)
+
+    def spread(self, occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Probability (V,) float32 and truth (V,) bool of every voxel of the grid, from the
+        probability (M,) of the occupied ones; that of the others is 0."""
+        probability = np.zeros(self.grid.n_voxels, np.float32)
+        probability[self.index] = occupied
+        truth = np.zeros(self.grid.n_voxels, bool)
+        truth[self.tower_index()] = True
+        return probability, truth
+
+    def tower_index(self) -> np.ndarray:
+        """(T,) flat positions of the tower voxels."""
+        return self.index[self.tower]
+
+
+def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSample:
+    """Count points and tower points in each voxel of ``grid``.
+
+    Raises:
+        InputError: the meaning of the class codes is not known.
+    """
+    from scenenet.dataset.voxel_counts import tally
+
+    index, count, tower = tally(grid.voxel_of(cloud.xyz), cloud.is_tower, grid.n_voxels)
+    return VoxelSample(sample_id, grid, index, count, tower)
+
+
+def _bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    if len(xyz) == 0:
+        raise InputError("there are no points to lay a grid over")
+    from scenenet.dataset.voxel_counts import extremes
+
+    return extremes(xyz)
+
+
+Measurement = Literal["presence", "density"]

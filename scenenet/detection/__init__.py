@@ -1,0 +1,1 @@
+"""From voxels at or above tau to towers: clusters, bodies, conductors."""

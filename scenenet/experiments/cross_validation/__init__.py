@@ -1,0 +1,1 @@
+"""Cross-validation: every crop is left out once."""

@@ -1,0 +1,193 @@
+"""The trainings of a study, one after the other, and their scores."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import torch
+
+from scenenet.core.errors import InputError
+from scenenet.core.files import atomic
+from scenenet.core.progress import track
+from scenenet.dataset.batches import batch
+from scenenet.dataset.crops import read_crops
+from scenenet.dataset.split import SplitSettings, split_crops
+from scenenet.dataset.voxels import VoxelSample, VoxelSettings, voxelise
+from scenenet.experiments.studies.settings import Plan, StudySettings
+from scenenet.metrics.threshold_curve import ThresholdCurve
+from scenenet.metrics.voxel_scores import Confusion
+from scenenet.models.answers import threshold_curve
+from scenenet.models.base import VoxelModel
+from scenenet.models.factory import new_model
+from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import ModelSettings
+from scenenet.training.train import LostTraining, fit
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+COLUMNS = (
+    "variant", "seed", "kind", "alive", "tau", "precision", "recall", "f05", "iou_tower", "miou",
+    "average_precision", "validation_f05", "training_crops", "parameters", "epochs", "loss",
+    "lowest_weight", "lowest_shape", "training_seconds", "inference_ms",
+)  # fmt: skip
+
+LOWEST = ("lowest_weight", "lowest_shape")
+
+
+def run_study(
+    crop_manifests: Sequence[str | Path],
+    study: StudySettings,
+    model: ModelSettings,
+    voxels: VoxelSettings,
+    split: SplitSettings,
+    out: str | Path,
+) -> pd.DataFrame:
+    """Train and score every variant from every seed, and write a row for each.
+
+    tau is chosen on the validation crops, as the variant is scored: after ``applied`` changes.
+    Variants that differ only in those share their trainings. A training that loses its way ends
+    with a model that finds nothing: its row is that of a dead one, without a loss.
+
+    Args:
+        crop_manifests: of the crop stores.
+        study: what to vary.
+        model, voxels, split: what is varied.
+        out: CSV file, columns ``COLUMNS``; ``lowest_weight`` and ``lowest_shape`` are the lowest
+            mixing weight and shape parameter of a SCENE-Net after training.
+
+    Returns:
+        what was written.
+
+    Raises:
+        InputError: there are too few crops, or a variant cannot be trained.
+    """
+    import pandas as pd
+
+    data = _Crops(crop_manifests)
+    trained: dict[Any, tuple[VoxelModel | None, dict[str, Any]]] = {}
+    rows = []
+    plans = [(plan, seed) for plan in study.plans(model, voxels, split) for seed in study.seeds]
+    for plan, seed in track(plans, f"study {study.name}: trainings"):
+        parts = data.parts(plan.split)
+        key = (plan.model.model_dump_json(), plan.voxels, plan.split, seed)
+        if key not in trained:
+            training = data.samples(plan.voxels, parts["train"])
+            trained[key] = _trained(training, plan.model, seed)
+        result, facts = trained[key]
+        validation = data.samples(plan.applied_voxels, parts["validation"])
+        scored = data.samples(plan.applied_voxels, parts[study.part])
+        row = {"variant": plan.name, "seed": seed, **facts}
+        if result is None:
+            rows.append(row | _nothing_found(scored))
+        else:
+            rows.append(row | _scores(_applied(result, plan), plan, validation, scored))
+    table = pd.DataFrame(rows)[list(COLUMNS)]
+    with atomic(out) as partial:
+        table.to_csv(partial, index=False, float_format="%.6g")
+    return table
+
+
+class _Crops:
+    """The crops on whatever grids and in whatever parts the variants ask for."""
+
+    def __init__(self, manifests: Sequence[str | Path]) -> None:
+        self._manifests = list(manifests)
+        self._grids: dict[VoxelSettings, dict[str, VoxelSample]] = {}
+        self._parts: dict[SplitSettings, dict[str, list[str]]] = {}
+
+    def parts(self, settings: SplitSettings) -> dict[str, list[str]]:
+        """Ids of the crops of each part."""
+        if settings not in self._parts:
+            table = split_crops(self._manifests, settings)
+            groups = table.groupby("part")["crop"].apply(list).to_dict()
+            self._parts[settings] = {str(part): crops for part, crops in groups.items()}
+        return self._parts[settings]
+
+    def samples(self, grid: VoxelSettings, ids: Sequence[str]) -> list[VoxelSample]:
+        """The crops called ``ids`` on ``grid``. Voxelising takes less than reading voxels does, so
+        they are made from the points, once for each grid, one crop in memory at a time."""
+        if grid not in self._grids:
+            self._grids[grid] = {
+                crop.id: voxelise(cloud, grid.grid(cloud.xyz), crop.id)
+                for manifest in self._manifests
+                for crop, cloud in read_crops(manifest)
+            }
+        return [self._grids[grid][crop] for crop in ids]
+
+
+def _trained(
+    training: Sequence[VoxelSample], settings: ModelSettings, seed: int
+) -> tuple[VoxelModel | None, dict[str, Any]]:
+    """The model, None where its training lost its way, and what is known of the training."""
+    begin = time.perf_counter()
+    try:
+        model, history = fit(training, [], settings, seed)
+        found = {"epochs": len(history), "loss": float(history["loss"].iloc[-1]), **_lowest(model)}
+    except LostTraining as error:
+        print(error, file=sys.stderr)
+        model, found = None, dict.fromkeys(("epochs", "loss", *LOWEST), math.nan)
+    return model, {
+        "kind": settings.kind,
+        "training_crops": len(training),
+        "parameters": (model or new_model(settings, seed)).n_parameters(),
+        "training_seconds": time.perf_counter() - begin,
+        **found,
+    }
+
+
+def _lowest(model: VoxelModel) -> dict[str, float]:
+    """Below zero they break the convexity that the loss is to keep (thesis 4.5, 5.3.3)."""
+    if not isinstance(model, SceneNet):
+        return dict.fromkeys(LOWEST, math.nan)
+    numbers = model.shape_parameters()
+    mixing = [value for name, value in numbers.items() if name.startswith("lambda.")]
+    shapes = [value for name, value in numbers.items() if not name.startswith("lambda.")]
+    return dict(zip(LOWEST, (min(mixing), min(shapes)), strict=True))
+
+
+def _applied(model: VoxelModel, plan: Plan) -> VoxelModel:
+    if plan.applied_size is None:
+        return model
+    if not isinstance(model, SceneNet):
+        raise InputError(
+            f"{plan.name}: a {model.kind} has no other kernel size than the one it was trained with"
+        )
+    return model.with_kernel_size(plan.applied_size)
+
+
+def _nothing_found(scored: Sequence[VoxelSample]) -> dict[str, Any]:
+    n_tower = sum(int(sample.tower.sum()) for sample in scored)
+    n_voxels = sum(sample.grid.n_voxels for sample in scored)
+    unknown = dict.fromkeys(("tau", "inference_ms"), math.nan)
+    zero = {"average_precision": 0.0, "validation_f05": 0.0, "alive": False}
+    return Confusion(fn=n_tower, tn=n_voxels - n_tower).scores() | unknown | zero
+
+
+def _scores(
+    model: VoxelModel,
+    plan: Plan,
+    validation: Sequence[VoxelSample],
+    scored: Sequence[VoxelSample],
+) -> dict[str, Any]:
+    measurement = plan.model.measurement
+    tau, chosen = threshold_curve(model, validation, measurement).best()
+    curve: ThresholdCurve = threshold_curve(model, scored, measurement)
+    counts = curve.at(tau)
+    begin = time.perf_counter()
+    with torch.no_grad():
+        for sample in scored:
+            model(batch([sample], measurement)[0])
+    inference = 1e3 * (time.perf_counter() - begin) / len(scored)
+    return counts.scores() | {
+        "alive": counts.tp > 0,
+        "tau": tau,
+        "average_precision": curve.average_precision(),
+        "validation_f05": chosen.f05,
+        "inference_ms": inference,
+    }

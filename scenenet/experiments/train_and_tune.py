@@ -1,0 +1,148 @@
+"""SCENE-Net, the CNN and the black box, trained on the same crops and scored on the same others.
+
+Each chooses tau in its own way (docs/accuracy.md): a SCENE-Net in metres on the crops it learnt
+from as well, the black box never on those.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenenet.baselines import boosted_trees
+from scenenet.baselines.boosted_trees import BoostedTreesSettings
+from scenenet.dataset.voxels import VoxelSample
+from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.crop_towers import find_in_crop
+from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
+from scenenet.metrics.voxel_scores import Confusion, confusion
+from scenenet.models.answers import probabilities, threshold_curve
+from scenenet.models.factory import new_model
+from scenenet.models.settings import ModelSettings
+from scenenet.training.objective import best_step
+from scenenet.training.train import LostTraining, fit
+
+Answer = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
+"""Probability (V,) and truth (V,) of all voxels of a sample."""
+
+
+@dataclass(frozen=True)
+class TunedModel:
+    """A trained model with what it was tuned to.
+
+    Attributes:
+        answer: what it says to a sample.
+        tau: threshold.
+        f05: at tau, on the crops that tau was chosen on.
+        parameters: trained numbers.
+        seconds: that training and tuning took.
+    """
+
+    answer: Answer
+    tau: float
+    f05: float
+    parameters: int
+    seconds: float
+
+    def score(self, samples: Iterable[VoxelSample]) -> Confusion:
+        """Counts over all voxels of ``samples``."""
+        total = Confusion()
+        for sample in samples:
+            total += confusion(*self.answer(sample), self.tau)
+        return total
+
+    def score_towers(
+        self, samples: Iterable[VoxelSample], detection: DetectionSettings
+    ) -> Confusion:
+        """The same of the voxels of whole towers that are found (docs/towers.md)."""
+        total = Confusion()
+        for sample in samples:
+            probability, truth = self.answer(sample)
+            _, theirs = find_in_crop(sample, probability, self.tau, detection)
+            total += confusion(sample.spread(theirs)[0], truth, 0.5)
+        return total
+
+    def curve(self, samples: Iterable[VoxelSample]) -> ThresholdCurve:
+        """Scores over all voxels of ``samples`` at every tau."""
+        total = ThresholdCurve.empty()
+        for sample in samples:
+            total += ThresholdCurve.of(*self.answer(sample))
+        return total
+
+
+def train_and_tune(
+    settings: ModelSettings | None,
+    training: Sequence[VoxelSample],
+    validation: Sequence[VoxelSample],
+    seed: int,
+) -> TunedModel:
+    """Train and tune one model.
+
+    Args:
+        settings: of the model; None for the black box.
+        validation: crops to choose tau on; without any it is chosen on the training crops, and
+            that of the black box by leaving out one of them at a time.
+
+    Raises:
+        InputError: there is no tower to learn from, or one crop alone for a black box.
+    """
+    if settings is None:
+        return train_boosted_trees(training, validation, seed)
+    return train_model(settings, training, validation, seed)
+
+
+def train_model(
+    settings: ModelSettings,
+    training: Sequence[VoxelSample],
+    validation: Sequence[VoxelSample],
+    seed: int,
+) -> TunedModel:
+    """A SCENE-Net or a CNN; as ``train_and_tune``. One that loses its way finds nothing."""
+    begin = time.perf_counter()
+    try:
+        model, _ = fit(training, [], settings, seed)
+    except LostTraining as error:
+        print(error, file=sys.stderr)
+        n, seconds = new_model(settings, seed).n_parameters(), time.perf_counter() - begin
+        return TunedModel(_nothing, float(THRESHOLDS[-1]), 0.0, n, seconds)
+    if model.field is None:
+        curve = threshold_curve(model, validation or training, settings.measurement)
+        tau, counts = curve.best()
+    else:
+        # As in ``scenenet.training.tuning``: eleven numbers hardly know their crops by heart.
+        both = [*training, *validation]
+        step, _ = best_step(
+            threshold_curve(model, both, settings.measurement), model.field.false_weight
+        )
+        curve = threshold_curve(model, validation or training, settings.measurement)
+        tau, counts = float(curve.tau[step]), curve.confusion(step)
+
+    def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
+        return probabilities(model, sample, settings.measurement)
+
+    return TunedModel(answer, tau, counts.f05, model.n_parameters(), time.perf_counter() - begin)
+
+
+def _nothing(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
+    return sample.spread(np.zeros(len(sample.index), np.float32))
+
+
+def train_boosted_trees(
+    training: Sequence[VoxelSample], validation: Sequence[VoxelSample], seed: int = 0
+) -> TunedModel:
+    """Trees; as ``train_and_tune``."""
+    begin = time.perf_counter()
+    settings = BoostedTreesSettings()
+    if validation:
+        grown = boosted_trees.fit(training, settings, seed)
+        curve = boosted_trees.threshold_curve(grown, validation)
+        model = replace(grown, tau=curve.best()[0])
+    else:
+        model, curve = boosted_trees.fit_and_tune(training, settings, seed)
+    seconds = time.perf_counter() - begin
+    f05 = curve.best()[1].f05
+    return TunedModel(model.probabilities, model.threshold(), f05, model.n_parameters(), seconds)

@@ -1,0 +1,123 @@
+"""A test crop as voxels that a page can turn: class, probability, contributions, and the counts at
+every threshold (thesis Figures 5.6, 5.8, 5.9)."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scenenet.core.files import write_json
+from scenenet.results.folder import Results
+
+if TYPE_CHECKING:
+    from scenenet.dataset.voxels import Measurement, VoxelSample
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.models.base import VoxelModel
+
+CLASSES = ("other", "ground", "vegetation", "wire", "tower")
+"""What a voxel shows, the later where it holds several."""
+
+
+def write_scene(
+    results: Results,
+    model: str,
+    rank: str,
+    out: str | Path,
+    detection: DetectionSettings | None = None,
+) -> dict[str, Any]:
+    """Write the best, median or worst test crop of a model for the page.
+
+    Arrays are little-endian and in base64: ``zyx`` (M, 3) int16 voxels, ``class`` (M,) uint8 places
+    in ``classes``, ``steps`` (M,) uint16 thresholds that the probability reaches, ``tower`` (M,)
+    uint8 truth, and for a SCENE-Net ``shares`` by GENEO, (M,) int8 percent of the answer. ``true``
+    and ``false`` are the counts of all voxels of the grid, empty ones included, that reach i of the
+    thresholds ``taus``, so that scores at any of them can be told without the grid. ``whole`` (M,)
+    uint8 says which voxels are of whole towers found at the model's tau, ``whole_scores`` what that
+    is worth over the grid.
+
+    Args:
+        model: name of the model; its seed that is best on validation is shown.
+        rank: best, median or worst, by F0.5 over the test crops.
+        out: JSON file.
+        detection: what makes a tower; the default if None.
+
+    Raises:
+        InputError: the model has not been tuned and evaluated.
+    """
+    from scenenet.dataset.voxels import VoxelSettings, voxelise
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.evaluation.crop_towers import find_in_crop
+    from scenenet.figures.selection import (
+        champion_of,
+        class_groups,
+        crop_cloud,
+        ranked,
+        voxel_classes,
+    )
+    from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
+    from scenenet.metrics.voxel_scores import confusion
+    from scenenet.models.answers import probabilities
+    from scenenet.models.model_file import read_model
+
+    champion = champion_of(results, model)
+    sample = ranked(champion, rank)
+    cloud = crop_cloud(results, sample)
+    trained, card = read_model(champion.model_files[0])
+    settings = VoxelSettings(fit=card.fit, resolution=card.resolution, voxel_size=card.voxel_size)
+    voxels = voxelise(cloud, settings.grid(cloud.xyz), sample["id"])
+    everywhere, truth = probabilities(trained, voxels, card.measurement)
+    curve = ThresholdCurve.of(everywhere, truth)
+    probability, tau = everywhere[voxels.index], card.threshold()
+    _, whole = find_in_crop(voxels, everywhere, tau, detection or DetectionSettings())
+    counts = confusion(voxels.spread(whole)[0], truth, 0.5).scores()
+    taus = THRESHOLDS.astype(probability.dtype)
+    zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
+    names = voxel_classes(class_groups(cloud), voxels.grid.voxel_of(cloud.xyz), voxels.index)
+    scene = {
+        "crop": sample["id"],
+        "rank": rank,
+        "model": model,
+        "seed": champion.seed,
+        "voxel_size": voxels.grid.voxel_size,
+        "classes": CLASSES,
+        "zyx": _coded(zyx.astype("<i2")),
+        "class": _coded(np.array([CLASSES.index(name) for name in names], np.uint8)),
+        "steps": _coded(np.searchsorted(taus, probability, side="right").astype("<u2")),
+        "tower": _coded(voxels.tower.astype("<u1")),
+        "shares": _shares(trained, voxels, card.measurement),
+        "whole": _coded(whole.astype("<u1")),
+        "whole_scores": {name: counts[name] for name in ("precision", "recall", "f05")},
+        "taus": [float(f"{tau:.6g}") for tau in THRESHOLDS],
+        "true": curve.true.tolist(),
+        "false": curve.false.tolist(),
+        "tau_step": int(np.argmin(np.abs(THRESHOLDS - tau))),
+    }
+    write_json(out, scene)
+    return scene
+
+
+def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) -> dict[str, str]:
+    """The part of each GENEO in the answer to each occupied voxel, coded; none for a CNN."""
+    import torch
+
+    from scenenet.convolution.convolve import convolve_at_voxels
+    from scenenet.dataset.batches import batch
+    from scenenet.models.scenenet import SceneNet
+
+    if not isinstance(model, SceneNet):
+        return {}
+    model = model.at(voxels.grid.voxel_size)
+    occupancy, _ = batch([voxels], measurement)
+    with torch.no_grad():
+        answers = convolve_at_voxels(occupancy, model.weighted_kernels())
+        parts = answers[:, model.argmax_rows(occupancy, answers.sum(dim=0))].numpy()
+    whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
+    percent = np.rint(100 * parts / whole).astype("<i1")
+    return {name: _coded(row) for name, row in zip(model.names, percent, strict=True)}
+
+
+def _coded(array: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

@@ -1,0 +1,1 @@
+"""How each kind of plot is drawn; plain data in, a matplotlib figure out."""

@@ -1,0 +1,93 @@
+"""What is shown of all that there is: the seed that is best on validation, the crop, the points.
+
+Crops are chosen by rule (best, median, worst), never by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scenenet.core.errors import InputError
+from scenenet.figures.plots.surveys import kinds_of
+from scenenet.results.folder import Results, SeedResult, read_table
+
+if TYPE_CHECKING:
+    from scenenet.pointcloud import PointCloud
+
+CLASSES = ("tower", "wire", "vegetation", "ground", "other")
+"""What a point may be, those that matter most first."""
+
+POINTS_PER_PICTURE = 60_000
+"""Enough to look dense at the size the pictures have."""
+
+
+def champion_of(results: Results, model: str) -> SeedResult:
+    """The seed that is best on validation.
+
+    Raises:
+        InputError: the model has not been tuned.
+    """
+    champion = results.champion(model)
+    if champion is None or not champion.model_files:
+        raise InputError(f"no tuned model called {model}", file=results.folder / "models" / model)
+    return champion
+
+
+def ranked(champion: SeedResult, rank: str) -> Mapping[str, Any]:
+    """The best, median or worst test crop by F0.5; ties by name."""
+    ordered = sorted(champion.evaluation["per_sample"], key=lambda s: (-s["f05"], s["id"]))
+    if not ordered:
+        raise InputError(f"{champion.model} seed {champion.seed} was evaluated on no crop")
+    return {"best": ordered[0], "median": ordered[len(ordered) // 2], "worst": ordered[-1]}[rank]
+
+
+def crop_cloud(results: Results, sample: Mapping[str, Any]) -> PointCloud:
+    """The points of a test crop, ``sample`` being its entry in an evaluation."""
+    from scenenet.dataset.zarr_store import StoreReader
+    from scenenet.pointcloud import PointCloud, class_scheme
+
+    split = read_table(results.folder / "split" / "split.csv").astype({"crop": str})
+    survey = split.loc[split["crop"] == sample["id"], "survey"].iloc[0]
+    reader = StoreReader(results.folder / "crops" / survey / "manifest.json")
+    arrays = reader.get(sample["id"])
+    scheme = class_scheme(reader.manifest["codes"])
+    return PointCloud(arrays["xyz"], arrays["classification"], scheme)
+
+
+def class_groups(cloud: PointCloud) -> np.ndarray:
+    """(N,) what each point is, as ``figures.CLASS_COLOURS`` names it.
+
+    The public TS40K crops code trees otherwise than Table 5.1 says (``figures.beside.EDP_KINDS``).
+    """
+    groups = np.full(len(cloud), "other", dtype="U10")
+    if cloud.scheme is not None and cloud.scheme.name == "edp":
+        kinds = kinds_of(cloud.classification)
+        groups[np.isin(kinds, ("low", "tall"))] = "vegetation"
+        groups[kinds == "ground"] = "ground"
+    for name in ("ground", "vegetation", "wire", "tower"):
+        groups[np.isin(cloud.classification, list(getattr(cloud.scheme, name)))] = name
+    return groups
+
+
+def voxel_classes(groups: np.ndarray, voxel: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """(M,) what each occupied voxel holds: the first of ``CLASSES`` that any of its points is.
+
+    Args:
+        groups: (N,) of ``class_groups``.
+        voxel: (N,) flat voxel of each point.
+        index: (M,) flat occupied voxels, ascending.
+    """
+    codes = np.zeros(len(groups), np.uint8)
+    for code, name in enumerate(reversed(CLASSES)):
+        codes[groups == name] = code
+    shown = np.zeros(len(index), np.uint8)
+    np.maximum.at(shown, np.searchsorted(index, voxel), codes)
+    return np.array(CLASSES)[::-1][shown]
+
+
+def thinned(n: int, most: int = POINTS_PER_PICTURE) -> np.ndarray:
+    """Evenly spread positions of at most ``most`` of ``n`` points."""
+    return np.arange(0, n, max(1, -(-n // most)))

@@ -1,0 +1,176 @@
+"""How far a model's answers move with the scene (thesis 4.1, 4.4.1, Eq. 3.1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from scenenet.convolution.convolve import convolve
+from scenenet.convolution.occupancy import Occupancy
+from scenenet.core.errors import InputError
+from scenenet.dataset.voxels import MAX_VOXELS, Measurement, VoxelGrid, VoxelSample
+
+if TYPE_CHECKING:
+    from scenenet.models.base import VoxelModel
+
+SHIFT = (2, 3, 5)
+"""Whole voxels (z, y, x) of the translation that is measured."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Answers to a scene and to the scene moved, at the same points.
+
+    Attributes:
+        degrees: turn about z; None for the shift by half a voxel.
+        mean_h: mean |difference| of H, as a share of the standard deviation of H.
+        mean_m: mean |difference| of M, in [0, 1].
+        largest_m: the largest.
+        decided_otherwise: share of those decided tower either way that are so in one alone; None
+            without tau, or where none is.
+    """
+
+    degrees: float | None
+    mean_h: float
+    mean_m: float
+    largest_m: float
+    decided_otherwise: float | None
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Points about their vertical axis, and how to lay them on a grid that holds every turn."""
+
+    xyz: np.ndarray
+    grid: VoxelGrid
+    measurement: Measurement
+
+    @classmethod
+    def of(cls, points: np.ndarray, voxel_size: float, measurement: Measurement) -> Scene:
+        if len(points) == 0:
+            raise InputError("there are no points to measure equivariance on")
+        middle = (points.min(axis=0) + points.max(axis=0)) / 2
+        xyz = points - middle
+        radius = float(np.hypot(xyz[:, 0], xyz[:, 1]).max())
+        # Odd, so that the axis runs through the middle of a voxel; half a voxel to spare on top.
+        n = 2 * math.ceil(radius / voxel_size + 0.5) + 1
+        nz = 2 * math.ceil(float(xyz[:, 2].max()) / voxel_size + 0.5) + 1
+        if float(n) * n * nz > MAX_VOXELS:
+            raise InputError(
+                f"{2 * radius:.0f} m across need more than {MAX_VOXELS} voxels of {voxel_size:g} m",
+                remedy="Take a crop, or larger voxels",
+            )
+        origin = (-n * voxel_size / 2, -n * voxel_size / 2, -nz * voxel_size / 2)
+        return cls(xyz, VoxelGrid(origin, voxel_size, (nz, n, n)), measurement)
+
+    def laid(self, xyz: np.ndarray) -> tuple[Occupancy, np.ndarray]:
+        """The points on the grid, and the flat position of each."""
+        at = self.grid.voxel_of(np.ascontiguousarray(xyz))
+        index, count = np.unique(at, return_counts=True)
+        sample = VoxelSample("", self.grid, index, count, np.zeros(len(index), bool))
+        return Occupancy.of_grids([index], [sample.phi(self.measurement)], self.grid.shape), at
+
+    def turned(self, degrees: float) -> np.ndarray:
+        """(N, 3), turned about z."""
+        c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+        return self.xyz @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+
+
+def sample_scene(seed: int = 0) -> np.ndarray:
+    """(N, 3) xyz, m: a pole of 15 m with an arm and two wires, and two trees, on bumpy ground."""
+    rng = np.random.default_rng(seed)
+    ground = rng.uniform(-20, 20, (6000, 2))
+    bumps = 0.5 * np.sin(ground[:, 0] / 6) * np.cos(ground[:, 1] / 8)
+    parts = [np.column_stack([ground, bumps])]
+    parts.append(np.column_stack([rng.normal(0, 0.25, (400, 2)), rng.uniform(0, 15, 400)]))
+    along = np.arange(-20, 20, 0.1)
+    for side in (-2.0, 2.0):
+        parts.append(np.column_stack([along, np.full(len(along), side), 13 + along**2 / 400]))
+    arm = np.arange(-2.0, 2.0, 0.05)
+    parts.append(np.column_stack([np.zeros(len(arm)), arm, np.full(len(arm), 14.0)]))
+    for x, y, height in ((9.0, 8.0, 5.0), (-10.0, -7.0, 7.0)):
+        crown = rng.normal(size=(600, 3)) * [1.5, 1.5, height / 5] + [x, y, height]
+        parts.append(crown)
+    return np.concatenate(parts)
+
+
+def exact_errors(kernel: Tensor, scene: Scene) -> tuple[float, float]:
+    """Errors of H under ``SHIFT`` and under the worst quarter turn, as shares of max |H|."""
+    occupancy, _ = scene.laid(scene.xyz)
+    answer = convolve(occupancy, kernel)[0]
+    largest = float(answer.abs().max()) or 1.0
+    dense = occupancy.dense()[0]
+    # Room on the high sides, so that nothing leaves the grid.
+    (dz, dy, dx), (nz, ny, nx) = SHIFT, scene.grid.shape
+    roomy = torch.nn.functional.pad(dense, (0, dx, 0, dy, 0, dz))
+    here = answer_of(kernel, roomy)
+    there = answer_of(kernel, torch.roll(roomy, SHIFT, (0, 1, 2)))
+    shifted = float((there[dz:, dy:, dx:] - here[:nz, :ny, :nx]).abs().max())
+    quarters = [
+        answer_of(kernel, torch.rot90(dense, q, (1, 2))) - torch.rot90(answer, q, (1, 2))
+        for q in (1, 2, 3)
+    ]
+    return shifted / largest, max(float(q.abs().max()) for q in quarters) / largest
+
+
+def turns_of(
+    model: VoxelModel, scene: Scene, angles: Sequence[float], tau: float | None
+) -> tuple[Turn, tuple[Turn, ...]]:
+    """The scene moved by half a voxel, and turned: at each point, before against after."""
+    kernel, bias = model.observer()
+
+    def answers(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        occupancy, at = scene.laid(xyz)
+        observed = convolve(occupancy, kernel)
+        if bias is not None:
+            observed = observed + bias
+        probability = model(occupancy)
+        return (
+            observed.reshape(-1).numpy()[at].astype(float),
+            probability.reshape(-1).numpy()[at].astype(float),
+        )
+
+    h0, m0 = answers(scene.xyz)
+    spread = float(h0.std()) or 1.0
+
+    def against(xyz: np.ndarray, degrees: float | None) -> Turn:
+        h, m = answers(xyz)
+        otherwise = None
+        if tau is not None and (either := (m >= tau) | (m0 >= tau)).any():
+            otherwise = float(((m >= tau) != (m0 >= tau))[either].mean())
+        apart = np.abs(m - m0)
+        return Turn(
+            degrees,
+            float(np.abs(h - h0).mean() / spread),
+            float(apart.mean()),
+            float(apart.max()),
+            otherwise,
+        )
+
+    half = scene.grid.voxel_size / 2 * np.array([1.0, 1.0, 0.0])
+    shifted = against(scene.xyz + half, None)
+    return shifted, tuple(against(scene.turned(angle), float(angle)) for angle in angles)
+
+
+def kernel_turn_error(kernel: Tensor) -> float:
+    """max |k - k turned| / max |k|; 1 where the box itself cannot be turned about the anchor."""
+    _, ky, kx = kernel.shape
+    if ky != kx or ky % 2 == 0:
+        return 1.0
+    largest = float(kernel.abs().max()) or 1.0
+    return float((kernel - torch.rot90(kernel, 1, (1, 2))).abs().max()) / largest
+
+
+def answer_of(kernel: Tensor, dense: Tensor) -> Tensor:
+    """H (D, H, W) of a scene given as a volume (D, H, W)."""
+    depth, height, width = dense.shape
+    flat = dense.reshape(-1).numpy()
+    occupied = np.flatnonzero(flat)
+    occupancy = Occupancy.of_grids([occupied], [flat[occupied]], (depth, height, width))
+    return convolve(occupancy, kernel)[0]

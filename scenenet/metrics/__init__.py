@@ -1,0 +1,1 @@
+"""Scores of voxels and of towers (thesis 5.2.4)."""

@@ -1,0 +1,109 @@
+"""Counts and scores at every detection threshold tau (thesis 5.2.4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.metrics.voxel_scores import BETA, Confusion
+
+THRESHOLDS = np.tanh(np.arange(1, 651) / 100)
+"""The thresholds that are tried, (650,), ascending; without 0, where everything would be a tower.
+
+They are evenly spaced in what the observer answers before tanh (thesis 4.3). An observer that sums
+up dozens of voxels has most of its probabilities above 0.99, where evenly spaced thresholds could
+not tell them apart; beyond the last one float32 cannot tell neighbours apart either.
+"""
+
+
+@dataclass(frozen=True)
+class ThresholdCurve:
+    """Confusions at every one of ``THRESHOLDS``; curves of several samples add up.
+
+    Attributes:
+        true, false: (651,) counts of tower and of other voxels that reach i of the thresholds.
+    """
+
+    true: np.ndarray
+    false: np.ndarray
+
+    @classmethod
+    def empty(cls) -> ThresholdCurve:
+        """Of no voxels: where a sum begins."""
+        nothing = np.zeros(len(THRESHOLDS) + 1, np.int64)
+        return cls(nothing, nothing)
+
+    @classmethod
+    def of(cls, probability: np.ndarray, tower: np.ndarray) -> ThresholdCurve:
+        """From probabilities (V,) and truth (V,) bool; all voxels of the grid must be given."""
+        # Compared in the probabilities' own type, as ``confusion`` does: 0.3 counts for 0.3.
+        taus = THRESHOLDS.astype(probability.dtype)
+        # Most voxels are empty and have probability 0; they are counted and not sorted into bins.
+        # What is not a number is no tower either.
+        some = np.flatnonzero(probability > 0)
+        bins, truth = np.searchsorted(taus, probability[some], side="right"), tower[some]
+        n = len(THRESHOLDS) + 1
+        true, false = np.bincount(bins[truth], minlength=n), np.bincount(bins[~truth], minlength=n)
+        n_tower = int(np.count_nonzero(tower))
+        true[0] += n_tower - int(true.sum())
+        false[0] += probability.size - n_tower - int(false.sum())
+        return cls(true, false)
+
+    def __add__(self, other: ThresholdCurve) -> ThresholdCurve:
+        return ThresholdCurve(self.true + other.true, self.false + other.false)
+
+    @property
+    def tau(self) -> np.ndarray:
+        """The thresholds, (650,), ascending."""
+        return THRESHOLDS
+
+    def confusion(self, step: int) -> Confusion:
+        """At ``tau[step]``."""
+        tp, fp = int(self.true[step + 1 :].sum()), int(self.false[step + 1 :].sum())
+        return Confusion(tp, fp, int(self.true.sum()) - tp, int(self.false.sum()) - fp)
+
+    def at(self, tau: float) -> Confusion:
+        """At one of the thresholds.
+
+        Raises:
+            ValueError: ``tau`` is none of them.
+        """
+        (steps,) = np.nonzero(self.tau == tau)
+        if len(steps) != 1:
+            raise ValueError(f"{tau} is none of the {len(self.tau)} thresholds")
+        return self.confusion(int(steps[0]))
+
+    def precision_recall(self) -> tuple[np.ndarray, np.ndarray]:
+        """Precision and recall (650,) at each tau; both 0 where nothing is detected."""
+        tp = self.true[::-1].cumsum()[::-1][1:]
+        fp = self.false[::-1].cumsum()[::-1][1:]
+        detected = np.maximum(tp + fp, 1)
+        return tp / detected, tp / max(1, int(self.true.sum()))
+
+    def best(self) -> tuple[float, Confusion]:
+        """tau with the highest F0.5, the highest such tau in a tie, and the counts there."""
+        precision, recall = self.precision_recall()
+        b2 = BETA**2
+        below = b2 * precision + recall
+        f05 = np.where(below > 0, (1 + b2) * precision * recall / np.where(below > 0, below, 1), 0)
+        step = int(len(f05) - 1 - np.argmax(f05[::-1]))
+        return float(self.tau[step]), self.confusion(step)
+
+    def average_precision(self) -> float:
+        """Area under the precision-recall curve (thesis Figure 5.7), as a step function."""
+        precision, recall = self.precision_recall()
+        gained = -np.diff(np.append(recall, 0.0))
+        return float((precision * gained).sum())
+
+
+def curve_columns(curve: ThresholdCurve) -> dict[str, list[float]]:
+    """Precision, recall and F0.5 at every tau, as plain lists."""
+    precision, recall = curve.precision_recall()
+    confusions = [curve.confusion(step).f05 for step in range(len(curve.tau))]
+    return {
+        "tau": curve.tau.tolist(),
+        "precision": precision.tolist(),
+        "recall": recall.tolist(),
+        "f05": confusions,
+    }

@@ -1,0 +1,64 @@
+"""Predicted towers matched with true ones by position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.metrics.voxel_scores import _ratio
+
+
+@dataclass(frozen=True)
+class TowerMatch:
+    """Predicted towers against true ones.
+
+    Attributes:
+        errors: (hits,) m, planar distance of each predicted tower to the true one it hit.
+        n_true, n_predicted: number of towers.
+    """
+
+    errors: np.ndarray
+    n_true: int
+    n_predicted: int
+
+    def __add__(self, other: TowerMatch) -> TowerMatch:
+        return TowerMatch(
+            np.concatenate([self.errors, other.errors]),
+            self.n_true + other.n_true,
+            self.n_predicted + other.n_predicted,
+        )
+
+    def scores(self) -> dict[str, float | int | None]:
+        hits = len(self.errors)
+        return {
+            "precision": _ratio(hits, self.n_predicted),
+            "recall": _ratio(hits, self.n_true),
+            "median_error_m": float(np.median(self.errors)) if hits else None,
+            "n_true": self.n_true,
+            "n_predicted": self.n_predicted,
+        }
+
+
+HIT_DISTANCE_M = 5.0
+"""A predicted tower this near (xy) to a true one is a hit (docs/design.md)."""
+
+
+def match_towers(
+    predicted: np.ndarray, true: np.ndarray, distance: float = HIT_DISTANCE_M
+) -> TowerMatch:
+    """Pair predicted (P, 2) with true (T, 2) positions, nearest pairs first, each used once."""
+    predicted = np.asarray(predicted, float).reshape(-1, 2)
+    true = np.asarray(true, float).reshape(-1, 2)
+    apart = np.linalg.norm(predicted[:, None] - true[None], axis=2)
+    taken_predicted, taken_true, errors = set(), set(), []
+    for flat in np.argsort(apart, axis=None, kind="stable"):
+        i, j = (int(k) for k in np.unravel_index(flat, apart.shape))
+        if apart[i, j] > distance:
+            break
+        if i in taken_predicted or j in taken_true:
+            continue
+        taken_predicted.add(i)
+        taken_true.add(j)
+        errors.append(apart[i, j])
+    return TowerMatch(np.asarray(errors, float), len(true), len(predicted))

@@ -1,0 +1,19 @@
+"""A new model from its settings."""
+
+from __future__ import annotations
+
+import torch
+
+from scenenet.models.base import VoxelModel
+from scenenet.models.cnn import CNN
+from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import ModelSettings
+
+
+def new_model(settings: ModelSettings, seed: int) -> VoxelModel:
+    """A model as ``settings`` say, its numbers drawn with ``seed``."""
+    generator = torch.Generator().manual_seed(seed)
+    if settings.kind == "cnn":
+        return CNN(settings.n_kernels, settings.kernel_size, generator=generator)
+    field = settings.field if settings.protocol == "field" else None
+    return SceneNet(settings.geneos, settings.kernel_size, field=field, generator=generator)

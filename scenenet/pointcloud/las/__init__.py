@@ -1,0 +1,1 @@
+"""LAS and LAZ files: headers, records, coordinate systems, safe decoding, writing."""

@@ -1,0 +1,258 @@
+"""The header of a LAS or LAZ file: what laspy reads, checked against the size of the file.
+
+laspy believes a header: a claim of a billion records is a loop of a billion steps, and a file that
+was cut off in transfer is read as fewer points without a word. So what could make it loop is looked
+at before it reads the header, and what the header claims of the points before it reads them.
+
+Layout of the public header block: ASPRS LAS 1.4 R15, section 2.4 (all numbers little endian).
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+from scenenet.core.errors import InputError
+from scenenet.pointcloud.las.chunk_table import check_chunks
+
+if TYPE_CHECKING:
+    import laspy
+
+HEADER_SIZES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}
+"""Least header size in bytes of LAS 1.x."""
+VLR_HEAD, EVLR_HEAD = 54, 60
+EMPTY_LAZ_BYTES = 32
+"""Most bytes behind the header of a LAZ file without points: an empty chunk table and its place."""
+FAR = 1e15
+"""No coordinate is as large, in whatever unit; float64 could not tell points apart there."""
+MAX_RECORDS = 256 * 2**20
+"""Most bytes of records before the points, and behind them: laspy holds them in memory."""
+GET_AGAIN = "Get the file again from where it came from, or repair it with its own software"
+REWRITE = "Rewrite it with a LAS tool (pdal translate, las2las), or get it again"
+
+
+@dataclass(frozen=True)
+class Vlr:
+    """A variable length record as it stands in the file, before laspy interprets it.
+
+    Attributes:
+        user_id: who defined it.
+        record_id: which record of theirs.
+        description: its text.
+        data: what it holds.
+    """
+
+    user_id: str
+    record_id: int
+    description: bytes
+    data: bytes
+
+
+@dataclass(frozen=True)
+class CheckedHeader:
+    """A header that agrees with its file.
+
+    Attributes:
+        path: the file.
+        las: the header as laspy reads it; the file has room for its points.
+        vlrs: the variable length records as they are.
+        waveforms_inside: whether waveforms follow the points, and are not in a file of their own.
+        warnings: what is wrong without standing in the way of the points.
+    """
+
+    path: Path
+    las: laspy.LasHeader
+    vlrs: tuple[Vlr, ...]
+    waveforms_inside: bool
+    warnings: tuple[str, ...]
+
+    @property
+    def format(self) -> str:
+        """``las``, ``laz`` or ``copc`` (a LAZ file whose points are ordered as an octree)."""
+        if not self.las.are_points_compressed:
+            return "las"
+        is_copc = bool(self.vlrs) and (self.vlrs[0].user_id, self.vlrs[0].record_id) == ("copc", 1)
+        return "copc" if is_copc else "laz"
+
+
+def read_header(path: str | Path) -> CheckedHeader:
+    """Read and check the header of a LAS or LAZ file.
+
+    Raises:
+        InputError: the header is not one, contradicts itself, or claims more than the file holds.
+    """
+    path = Path(path)
+    warnings: list[str] = []
+    with path.open("rb") as stream:
+        size = os.fstat(stream.fileno()).st_size
+        head = stream.read(max(HEADER_SIZES.values()))
+        minor = _check_version(path, head, size)
+        header_size, offset, n_vlrs = _check_places(path, head, size, minor)
+        vlrs = _read_vlrs(stream, header_size, offset, n_vlrs, warnings)
+        read_evlrs = _can_read_evlrs(head, size, minor, warnings)
+        las = _read_with_laspy(path, stream, read_evlrs)
+        _check_geometry(path, las, warnings)
+        waveforms = las.start_of_waveform_data_packet_record if minor >= 3 else 0
+        waveforms_inside = las.point_format.has_waveform_packet and 0 < waveforms < size
+        if waveforms_inside:
+            warnings.append("its waveforms are in the file itself: no prediction can be added")
+        else:
+            _check_room(path, las, las.start_of_first_evlr if las.evlrs else size, warnings)
+        if las.are_points_compressed:
+            check_chunks(path, las, stream, size)
+    return CheckedHeader(path, las, vlrs, waveforms_inside, tuple(warnings))
+
+
+def _check_version(path: Path, head: bytes, size: int) -> int:
+    """Check that the header block is there; returns the minor version."""
+    if len(head) < HEADER_SIZES[0]:
+        raise InputError(
+            f"the file is cut off: it has {size} bytes and a LAS header alone has 227",
+            file=path,
+            remedy=GET_AGAIN,
+        )
+    major, minor = head[24], head[25]
+    if major != 1 or minor not in HEADER_SIZES:
+        raise InputError(
+            f"its header says LAS {major}.{minor}; versions 1.0 to 1.5 can be read",
+            file=path,
+            place="byte 24",
+            remedy=REWRITE,
+        )
+    return minor
+
+
+def _check_places(path: Path, head: bytes, size: int, minor: int) -> tuple[int, int, int]:
+    """Check the size of the header, the place of the points and the number of records."""
+    header_size, offset, n_vlrs = struct.unpack_from("<HII", head, 94)
+    if header_size < HEADER_SIZES[minor]:
+        raise InputError(
+            f"the header says it is {header_size} bytes long, which in LAS 1.{minor} is at least "
+            f"{HEADER_SIZES[minor]}: the program that wrote the file did not finish it",
+            file=path,
+            place="byte 94",
+            remedy=REWRITE,
+        )
+    if not header_size <= offset <= min(size, MAX_RECORDS):
+        raise InputError(
+            f"the header says the points begin at byte {offset}, but the header ends at byte "
+            f"{header_size}, the file at byte {size}, and records of more than {MAX_RECORDS} bytes "
+            "are not read",
+            file=path,
+            place="byte 96",
+            remedy=GET_AGAIN if offset > size else REWRITE,
+        )
+    if n_vlrs * VLR_HEAD > offset:
+        raise InputError(
+            f"the header claims {n_vlrs} variable length records, which have no room in the "
+            f"{offset} bytes before the points",
+            file=path,
+            place="byte 100",
+            remedy=REWRITE,
+        )
+    return header_size, offset, n_vlrs
+
+
+def _read_vlrs(
+    stream: BinaryIO, header_size: int, offset: int, claimed: int, warnings: list[str]
+) -> tuple[Vlr, ...]:
+    stream.seek(0)
+    preamble, at = stream.read(offset), header_size
+    vlrs: list[Vlr] = []
+    while len(vlrs) < claimed and at + VLR_HEAD <= offset:
+        user, record_id, length, told = struct.unpack_from("<2x16sHH32s", preamble, at)
+        data = preamble[at + VLR_HEAD : at + VLR_HEAD + length]
+        if len(data) < length:
+            break
+        user_id = user.split(b"\0", 1)[0].decode("latin-1")
+        vlrs.append(Vlr(user_id, record_id, told.split(b"\0", 1)[0], data))
+        at += VLR_HEAD + length
+    if len(vlrs) < claimed:
+        warnings.append(
+            f"the header claims {claimed} variable length records, but only {len(vlrs)} fit before "
+            "the points"
+        )
+    return tuple(vlrs)
+
+
+def _can_read_evlrs(head: bytes, size: int, minor: int, warnings: list[str]) -> bool:
+    if minor < 4:
+        return False
+    first, count = struct.unpack_from("<QI", head, 235)
+    fit = count == 0 or (0 < first <= size - count * EVLR_HEAD and size - first <= MAX_RECORDS)
+    if not fit:
+        warnings.append(
+            f"the header claims {count} extended variable length records from byte {first} on, "
+            f"but the file has {size} bytes, or they are too large; they are taken as absent"
+        )
+    return fit
+
+
+def _read_with_laspy(path: Path, stream: BinaryIO, read_evlrs: bool) -> laspy.LasHeader:
+    import laspy
+
+    stream.seek(0)
+    try:
+        header = laspy.LasHeader.read_from(stream, read_evlrs=read_evlrs)
+        header.point_format.dtype()  # fails for two dimensions of one name
+    except Exception as error:  # laspy raises whatever comes of parsing damaged bytes
+        raise InputError(
+            f"its header cannot be read ({type(error).__name__}: {error})",
+            file=path,
+            remedy=REWRITE,
+        ) from error
+    return header
+
+
+def _check_geometry(path: Path, las: laspy.LasHeader, warnings: list[str]) -> None:
+    if not las.point_count:
+        return
+    for name, values, limit in (
+        ("scale", las.scales, FAR / 2**31),
+        ("offset", las.offsets, FAR),
+    ):
+        if not (np.abs(values) < limit).all() or (name == "scale" and (values == 0).any()):
+            raise InputError(
+                f"the coordinate {name}s in the header are {values.tolist()}: coordinates cannot "
+                "be told from them",
+                file=path,
+                remedy=REWRITE,
+            )
+    mins, maxs = las.mins, las.maxs
+    if not (np.isfinite([mins, maxs]).all() and (mins <= maxs).all()):
+        warnings.append(
+            f"the bounding box in the header is not one: {mins.tolist()} to {maxs.tolist()}"
+        )
+
+
+def _check_room(path: Path, las: laspy.LasHeader, end: int, warnings: list[str]) -> None:
+    """Compare the point count with the bytes from the first point to ``end``."""
+    room, length, n_points = end - las.offset_to_point_data, las.point_format.size, las.point_count
+    if n_points == 0 and room >= EMPTY_LAZ_BYTES + length:
+        raise InputError(
+            f"the header claims 0 points, but {room} bytes follow where points would be: the "
+            "program that wrote the file did not finish it",
+            file=path,
+            remedy=REWRITE,
+        )
+    if las.are_points_compressed or n_points == 0:
+        return
+    fit = max(room // length, 0)
+    if n_points > fit:
+        raise InputError(
+            f"the header claims {n_points} points, but the file holds only {fit}: it is cut off, "
+            "or its header is wrong",
+            file=path,
+            remedy=f"Get the whole file again; if {fit} points are all there are, rewrite its "
+            "header (pdal translate, las2las)",
+        )
+    if fit > n_points:
+        warnings.append(
+            f"behind the {n_points} points of the header there are {room - n_points * length} more "
+            f"bytes, room for {fit - n_points} points that are not read"
+        )

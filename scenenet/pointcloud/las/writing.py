@@ -1,0 +1,170 @@
+"""Writing a point cloud as a new LAS or LAZ file."""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenenet.core.errors import InputError
+from scenenet.core.files import atomic
+from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.las.extra_dimensions import checked, new_dimensions
+
+if TYPE_CHECKING:
+    import laspy
+    import pyproj
+
+CHUNK_POINTS = 500_000
+INT32_MAX = np.iinfo(np.int32).max
+NO_DATE = datetime.date.min
+"""Stands for no date: same points, same file. laspy would write the day on which it is run."""
+
+
+def write_las(
+    path: str | Path,
+    cloud: PointCloud,
+    *,
+    extra: Mapping[str, np.ndarray] | None = None,
+    scale: float = 0.001,
+) -> None:
+    """Write a cloud as LAS 1.4, point format 6; compressed where the suffix is ``.laz``.
+
+    The file appears whole or not at all.
+
+    Args:
+        path: ``.las`` or ``.laz`` file.
+        cloud: points, class codes and CRS; the CRS is written as WKT.
+        extra: further dimensions, name -> (N,) numbers.
+        scale: metres between two coordinates that can be told apart.
+
+    Raises:
+        InputError: the coordinates are not finite, or too far apart for that scale.
+        ValueError: an extra dimension has the wrong length, or a name or type that LAS cannot hold.
+    """
+    extra = {name: np.asarray(values) for name, values in (extra or {}).items()}
+    names = {name: (values.dtype, "") for name, values in extra.items()}
+    write_cloud(Path(path), cloud, new_dimensions(names, own=False), extra, scale)
+
+
+def write_cloud(
+    path: Path,
+    cloud: PointCloud,
+    dimensions: list[laspy.ExtraBytesParams],
+    extra: Mapping[str, np.ndarray],
+    scale: float,
+) -> None:
+    arrays = checked(extra, dimensions, len(cloud))
+    header = _header(cloud.crs, _offsets(path, cloud.xyz, scale), scale)
+    header.add_extra_dims(dimensions)
+    with open_writer(path, header) as writer:
+        for at in range(0, len(cloud), CHUNK_POINTS):
+            part = slice(at, at + CHUNK_POINTS)
+            columns = {name: values[part] for name, values in arrays.items()}
+            _write_points(writer, cloud.xyz[part], cloud.classification[part], columns)
+
+
+@contextlib.contextmanager
+def las_stream(
+    path: str | Path, crs: pyproj.CRS | None, offsets: np.ndarray, scale: float = 0.001
+) -> Iterator[Callable[[np.ndarray, np.ndarray], None]]:
+    """Write a survey part by part, as ``write_las`` does a whole one.
+
+    Yields a function that takes the next points (N, 3) and their codes (N,).
+
+    Args:
+        offsets: (3,) m; points lie within 2^31 ``scale`` of it.
+    """
+    with open_writer(Path(path), _header(crs, offsets, scale)) as writer:
+
+        def write(xyz: np.ndarray, classification: np.ndarray) -> None:
+            for at in range(0, len(xyz), CHUNK_POINTS):
+                part = slice(at, at + CHUNK_POINTS)
+                _write_points(writer, xyz[part], classification[part], {})
+
+        yield write
+
+
+def _header(crs: pyproj.CRS | None, offsets: np.ndarray, scale: float) -> laspy.LasHeader:
+    import laspy
+
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.system_identifier, header.generating_software = "EXTRACTION", "scenenet"
+    header.creation_date = NO_DATE
+    header.scales, header.offsets = np.full(3, float(scale)), np.asarray(offsets, float)
+    if crs is not None:
+        header.add_crs(crs)
+    return header
+
+
+def _write_points(
+    writer: laspy.LasWriter,
+    xyz: np.ndarray,
+    classification: np.ndarray,
+    columns: Mapping[str, np.ndarray],
+) -> None:
+    import laspy
+
+    points = laspy.ScaleAwarePointRecord.zeros(len(xyz), header=writer.header)
+    for axis, name in enumerate("xyz"):
+        points[name][:] = xyz[:, axis]
+    points["classification"] = classification
+    points["return_number"][:] = points["number_of_returns"][:] = 1
+    for name, values in columns.items():
+        points[name] = values
+    writer.write_points(points)
+
+
+@contextlib.contextmanager
+def open_writer(path: Path, header: laspy.LasHeader) -> Iterator[laspy.LasWriter]:
+    """laspy's writer of a file that appears whole or not at all; compressed by its suffix.
+
+    Raises:
+        InputError: the suffix is neither ``.las`` nor ``.laz``.
+    """
+    import laspy
+
+    suffix = path.suffix.lower()
+    if suffix not in (".las", ".laz"):
+        raise InputError(
+            f"a point cloud cannot be written as {suffix or 'a file without a suffix'}",
+            file=path,
+            remedy="Name a .laz (compressed) or .las file",
+        )
+    for record in header.vlrs.get("ExtraBytesVlr"):
+        for entry in record.extra_bytes_structs:
+            if entry.data_type:  # 0 is plain bytes, whose options are a count
+                # laspy takes the first point of a chunk for its least and greatest value.
+                entry.options &= ~(entry.MIN_BIT_MASK | entry.MAX_BIT_MASK)
+    with (
+        atomic(path) as partial,
+        # Text of other writers that is not ASCII is kept as the bytes it is.
+        laspy.open(partial, mode="w", header=header, encoding_errors="surrogateescape") as writer,
+    ):
+        yield writer
+
+
+def _offsets(path: Path, xyz: np.ndarray, scale: float) -> np.ndarray:
+    if not scale > 0:
+        raise ValueError(f"the scale must be above 0, not {scale}")
+    if len(xyz) == 0:
+        return np.zeros(3)
+    mins, maxs = xyz.min(axis=0), xyz.max(axis=0)
+    if not np.isfinite([mins, maxs]).all():
+        raise InputError("coordinates that are not numbers cannot be written", file=path)
+    # Whole kilometres, so that files of one area share their offsets and the stored steps agree.
+    offsets = np.floor(mins / 1000) * 1000
+    if ((maxs - offsets) / scale > INT32_MAX).any():
+        offsets = np.floor((mins + maxs) / 2)
+    if (np.maximum(maxs - offsets, offsets - mins) / scale > INT32_MAX).any():
+        raise InputError(
+            f"the points are {(maxs - mins).max():g} m apart, which steps of {scale:g} m cannot "
+            "tell in a LAS file",
+            file=path,
+            remedy="Remove stray points, or write with a larger scale",
+        )
+    return offsets

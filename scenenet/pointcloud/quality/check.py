@@ -1,0 +1,271 @@
+"""What is in a survey and what is wrong with it: the first stage, and ``scenenet check``.
+
+One pass over the points, in memory that does not grow with the survey. The class densities are
+those of thesis Table 5.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import Field
+
+from scenenet.core.settings import Settings
+from scenenet.pointcloud.class_schemes import ClassScheme, class_scheme
+from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.file_kinds import kind_of
+from scenenet.pointcloud.las.crs import CrsRecord, in_degrees, read_crs
+from scenenet.pointcloud.las.header import read_header
+from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
+from scenenet.pointcloud.quality.cell_counts import CellCounts, DuplicateCount
+from scenenet.pointcloud.quality.report import SurveyReport, class_table, find_warnings
+from scenenet.pointcloud.reading import iter_chunks, survey_info
+from scenenet.pointcloud.ts40k import sample_files
+
+if TYPE_CHECKING:
+    import laspy
+
+METRES_IN_A_DEGREE = 111_320.0
+
+
+class CheckSettings(Settings):
+    """How a survey is checked."""
+
+    density_cell: float = Field(
+        2.0,
+        gt=0,
+        description="side of the cells that count as covered where they hold a point, m; give "
+        "several times the distance between points",
+    )
+    stray_factor: float = Field(
+        3.0,
+        gt=0,
+        description="a point is stray when it lies further outside of the middle 98 % of the "
+        "points than this many times their extent, along any axis",
+    )
+    stray_share: float = Field(
+        0.005, ge=0, lt=0.5, description="share of points that may be stray; more are a part of it"
+    )
+    chunk_points: int = Field(500_000, ge=1, description="points in memory at a time")
+    max_cells: int = Field(
+        2_000_000, ge=1000, description="cells remembered; beyond it they are made coarser"
+    )
+    duplicate_sample: int = Field(
+        500_000,
+        ge=1000,
+        description="places remembered in the search for duplicates; beyond it their share is "
+        "estimated from a sample of places",
+    )
+
+
+@dataclass
+class Tally:
+    """What one pass over the points adds up.
+
+    Attributes:
+        counts: (256,) points of each class code.
+        mins, maxs: (3,) extent of the points themselves.
+        planar, vertical: points by planar cell and by height.
+        duplicates: points at a place that another point has.
+        outside: points outside of the header's bounding box.
+        bad_time: points whose GPS time is not a number.
+        withheld: points marked as withheld.
+        bad_returns: points whose return number is 0 or above the number of returns.
+        has_returns: whether any point has a return number at all.
+    """
+
+    planar: CellCounts
+    vertical: CellCounts
+    duplicates: DuplicateCount
+    counts: np.ndarray
+    mins: np.ndarray
+    maxs: np.ndarray
+    outside: int = 0
+    bad_time: int = 0
+    withheld: int = 0
+    bad_returns: int = 0
+    has_returns: bool = False
+
+
+def check_survey(
+    path: str | Path, codes: str | None = None, settings: CheckSettings | None = None
+) -> SurveyReport:
+    """Read a survey once and report what is in it.
+
+    Args:
+        path: LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples, which are taken
+            together.
+        codes: class scheme of its codes; None where nobody has said: classes stay numbers.
+        settings: how to check.
+
+    Returns:
+        the report; what is odd but readable is among its warnings.
+
+    Raises:
+        InputError: the survey cannot be read.
+    """
+    settings = settings or CheckSettings()
+    path = Path(path)
+    if path.is_dir():
+        reports = [check_survey(sample, codes, settings) for sample in sample_files(path)]
+        return _together(path, reports, None if codes is None else class_scheme(codes))
+    scheme = None if codes is None else class_scheme(codes)
+    info = survey_info(path)
+    header = read_header(path) if kind_of(path) == "las" else None
+    told = CrsRecord(None, None) if header is None else read_crs(header.las)
+    degrees = in_degrees(told.crs, info.mins, info.maxs, info.scales)
+    unit = told.unit_m or 1.0
+    cell = settings.density_cell / (METRES_IN_A_DEGREE if degrees else unit)
+    tally = Tally(
+        planar=CellCounts(cell, settings.max_cells),
+        vertical=CellCounts(settings.density_cell, settings.max_cells),
+        duplicates=DuplicateCount(settings.duplicate_sample),
+        counts=np.zeros(256, np.int64),
+        mins=np.full(3, np.inf),
+        maxs=np.full(3, -np.inf),
+    )
+    if header is None:
+        for cloud in iter_chunks(path, codes, settings.chunk_points):
+            _add_cloud(tally, cloud)
+    else:
+        for records in iter_records(header, settings.chunk_points):
+            _add_records(tally, header.las, records)
+    return _report(info, told, degrees, unit, tally, scheme, settings)
+
+
+def _add_cloud(tally: Tally, cloud: PointCloud) -> None:
+    _add(tally, cloud.xyz, cloud.classification)
+    # Adding zero makes -0.0 and 0.0, which are one place, the same bytes.
+    tally.duplicates.add((cloud.xyz + 0.0).view(np.uint64))
+
+
+def _add_records(
+    tally: Tally, header: laspy.LasHeader, records: laspy.ScaleAwarePointRecord
+) -> None:
+    xyz = coordinates(records)
+    _add(tally, xyz, class_codes(records))
+    places = np.column_stack([records[axis] for axis in "XYZ"])
+    tally.duplicates.add(places.astype(np.int64).view(np.uint64))
+    margin = np.abs(header.scales)
+    inside = (xyz >= header.mins - margin) & (xyz <= header.maxs + margin)
+    tally.outside += int((~inside.all(axis=1)).sum())
+    if "gps_time" in header.point_format.dimension_names:
+        tally.bad_time += int((~np.isfinite(records["gps_time"])).sum())
+    number = np.asarray(records["return_number"])
+    total = np.asarray(records["number_of_returns"])
+    tally.withheld += int(np.count_nonzero(records["withheld"]))
+    tally.bad_returns += int(((number == 0) | (number > total)).sum())
+    tally.has_returns |= bool((number | total).any())
+
+
+def _add(tally: Tally, xyz: np.ndarray, codes: np.ndarray) -> None:
+    tally.counts += np.bincount(codes, minlength=256)
+    tally.mins = np.minimum(tally.mins, xyz.min(axis=0))
+    tally.maxs = np.maximum(tally.maxs, xyz.max(axis=0))
+    tally.planar.add(xyz[:, 0], xyz[:, 1])
+    tally.vertical.add(xyz[:, 2])
+
+
+def _count_stray(tally: Tally, settings: CheckSettings) -> int:
+    """Points far outside of where nearly all are; 0 where so many are that they are no accident."""
+    total = int(tally.counts.sum())
+    if total < 100:
+        return 0
+    stray = 0
+    for cells, axis in ((tally.planar, 0), (tally.planar, 1), (tally.vertical, 0)):
+        stray += cells.count_far(axis, settings.stray_factor)
+    return stray if stray <= settings.stray_share * total else 0
+
+
+def _report(info, told, degrees, unit, tally, scheme, settings) -> SurveyReport:
+    n_points = int(tally.counts.sum())
+    area = None
+    if n_points and not degrees:
+        area = tally.planar.n_cells * (tally.planar.cell * unit) ** 2
+    facts: dict[str, Any] = {
+        "survey": info.path.name,
+        "format": info.format,
+        "version": info.version,
+        "point_format": info.point_format,
+        "n_points": n_points,
+        "mins": _finite(tally.mins),
+        "maxs": _finite(tally.maxs),
+        "header_mins": _finite(np.array(info.mins)),
+        "header_maxs": _finite(np.array(info.maxs)),
+        "area_m2": area,
+        "density_per_m2": None if not area else n_points / area,
+        "crs": None if told.crs is None else told.crs.name,
+        "epsg": None if told.crs is None else told.crs.to_epsg(),
+        "unit": "degree" if degrees else _unit_name(told),
+        "codes": None if scheme is None else scheme.name,
+        "extra_dimensions": list(info.extra_dimensions),
+        "duplicated_points": tally.duplicates.estimate(n_points),
+        "duplicates_estimated": tally.duplicates.is_sampled,
+        "stray_points": _count_stray(tally, settings),
+        "points_outside_header_box": tally.outside,
+        "points_without_gps_time": tally.bad_time,
+        "withheld_points": tally.withheld,
+        "impossible_returns": tally.bad_returns if tally.has_returns else 0,
+    }
+    classes = class_table(tally.counts, scheme)
+    warnings = find_warnings(facts, tally.counts, scheme, told, info.warnings)
+    return SurveyReport(facts, classes, tuple(warnings))
+
+
+SUMMED = (
+    "n_points", "duplicated_points", "stray_points", "points_outside_header_box",
+    "points_without_gps_time", "withheld_points", "impossible_returns",
+)  # fmt: skip
+
+
+def _together(
+    folder: Path, reports: Sequence[SurveyReport], scheme: ClassScheme | None
+) -> SurveyReport:
+    """The samples of a folder as one survey; ``samples`` is their number."""
+    each = [report.facts for report in reports]
+    counts = np.zeros(256, np.int64)
+    for report in reports:
+        counts[report.classes["code"].to_numpy(int)] += report.classes["points"].to_numpy(int)
+    facts = {**each[0], "survey": folder.name, "samples": len(each)}
+    facts |= {name: sum(one[name] for one in each) for name in SUMMED}
+    facts["duplicates_estimated"] = any(one["duplicates_estimated"] for one in each)
+    for ends, of_both in (("mins", np.min), ("maxs", np.max)):
+        for name in (ends, f"header_{ends}"):
+            known = [one[name] for one in each if one[name] is not None]
+            facts[name] = of_both(known, axis=0).tolist() if known else None
+    areas = [one["area_m2"] for one in each if one["area_m2"]]
+    facts["area_m2"] = sum(areas) if areas else None
+    facts["density_per_m2"] = facts["n_points"] / facts["area_m2"] if areas else None
+    warnings = find_warnings(facts, counts, scheme, CrsRecord(None, None), ())
+    if scheme is not None and any(counts[code] for code in scheme.tower):
+        without = [report.facts["survey"] for report in reports if not _has_tower(report, scheme)]
+        if without:
+            listed = ", ".join(without[:5]) + (" and more" if len(without) > 5 else "")
+            warnings.append(
+                f"no point is labelled tower in {len(without)} of {len(each)} samples: {listed}"
+            )
+    return SurveyReport(facts, class_table(counts, scheme), tuple(warnings))
+
+
+def _has_tower(report: SurveyReport, scheme: ClassScheme) -> bool:
+    classes = report.classes
+    return bool(classes.loc[classes["code"].isin(scheme.tower), "points"].sum())
+
+
+def _finite(values: np.ndarray) -> list[float] | None:
+    return values.tolist() if np.isfinite(values).all() else None
+
+
+def _unit_name(told: CrsRecord) -> str | None:
+    if told.unit_m is None:
+        return None
+    names: Iterator[str] = (
+        name
+        for name, metres in (("metre", 1.0), ("foot", 0.3048), ("US survey foot", 1200 / 3937))
+        if abs(told.unit_m - metres) < 1e-9
+    )
+    return next(names, f"{told.unit_m:g} m")

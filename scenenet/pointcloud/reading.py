@@ -1,0 +1,166 @@
+"""Reading a survey, whatever its format: as a whole, piece by piece, or its header alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenenet.core.errors import InputError
+from scenenet.pointcloud.class_schemes import class_scheme
+from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.file_kinds import kind_of
+from scenenet.pointcloud.las.crs import read_crs, unit_in_metres
+from scenenet.pointcloud.las.header import read_header
+from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
+from scenenet.pointcloud.ts40k import read_sample
+
+if TYPE_CHECKING:
+    import pyproj
+
+CHUNK_POINTS = 1_000_000
+
+
+@dataclass(frozen=True)
+class SurveyInfo:
+    """What a survey's header says, checked against the size of the file.
+
+    Attributes:
+        path: the file.
+        format: ``las``, ``laz``, ``copc``, ``npy`` or ``pt``.
+        version: LAS version (``"1.4"``); None for other formats.
+        point_format: LAS point format 0-10; None for other formats.
+        n_points: number of points; the file has room for them.
+        mins, maxs: bounding box (x, y, z) that a LAS header claims. Points may lie outside of a
+            careless one; of .npy and .pt it is that of the points. NaN without points.
+        crs: coordinate reference system; None where none is named or understood.
+        scales: step of the stored coordinates (x, y, z); None for .npy and .pt.
+        extra_dimensions: names of the dimensions beyond those of the point format.
+        warnings: what is wrong with the header without standing in the way of the points.
+    """
+
+    path: Path
+    format: str
+    version: str | None
+    point_format: int | None
+    n_points: int
+    mins: tuple[float, float, float]
+    maxs: tuple[float, float, float]
+    crs: pyproj.CRS | None
+    scales: tuple[float, float, float] | None
+    extra_dimensions: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+def survey_info(path: str | Path) -> SurveyInfo:
+    """The header of a survey; no point of a LAS, LAZ or COPC file is decoded.
+
+    Raises:
+        InputError: the file is missing, not a point cloud, or its header contradicts its size.
+    """
+    path = Path(path)
+    kind = kind_of(path)
+    if kind != "las":
+        xyz, _ = read_sample(path, kind)
+        mins, maxs = (xyz.min(0), xyz.max(0)) if len(xyz) else (np.full(3, np.nan),) * 2
+        return SurveyInfo(
+            path=path, format=kind, version=None, point_format=None, n_points=len(xyz),
+            mins=_triple(mins), maxs=_triple(maxs), crs=None, scales=None, extra_dimensions=(),
+            warnings=(),
+        )  # fmt: skip
+    header = read_header(path)
+    las, told = header.las, read_crs(header.las)
+    return SurveyInfo(
+        path=path,
+        format=header.format,
+        version=str(las.version),
+        point_format=las.point_format.id,
+        n_points=header.las.point_count,
+        mins=_triple(las.mins),
+        maxs=_triple(las.maxs),
+        crs=told.crs,
+        scales=_triple(las.scales),
+        extra_dimensions=tuple(las.point_format.extra_dimension_names),
+        warnings=header.warnings if told.problem is None else (*header.warnings, told.problem),
+    )
+
+
+def survey_in_metres(path: str | Path) -> SurveyInfo:
+    """The header of a survey whose coordinates are metres, as far as the file says.
+
+    Sizes of voxels, kernels and towers are lengths: in degrees or feet they would mean nothing.
+
+    Raises:
+        InputError: as ``survey_info``, and where the coordinates are known to be something else.
+    """
+    info = survey_info(path)
+    unit = unit_in_metres(info.crs)
+    # Only what the file says: small numbers without a CRS may be a local system in metres, and
+    # ``check`` warns of them.
+    degrees = info.crs is not None and info.crs.is_geographic
+    if degrees or unit not in (None, 1.0):
+        raise InputError(
+            "coordinates are degrees" if degrees else f"a unit of the coordinates is {unit:g} m",
+            file=path,
+            place=f"CRS {info.crs.name}" if info.crs else None,
+            remedy="Reproject it to metres first (pdal translate --filter filters.reprojection)",
+        )
+    return info
+
+
+def iter_chunks(
+    path: str | Path, codes: str | None = None, chunk_points: int = CHUNK_POINTS
+) -> Iterator[PointCloud]:
+    """The points of a survey in the order of the file, a chunk at a time.
+
+    Memory is bounded by the chunk for LAS, LAZ and COPC. Every point comes: withheld, noise and
+    overlap points too. A survey of 0 points gives no chunk. Errors in header, name or codes come
+    with the call, not with the first chunk.
+
+    Args:
+        path: LAS, LAZ, COPC, .npy or .pt file.
+        codes: class scheme (a name of ``SCHEMES``); None where nobody has said.
+        chunk_points: points in each chunk but the last.
+
+    Raises:
+        InputError: the file cannot be read as what it says it is; the message names it and says
+            why, also where the decoder hung or crashed.
+    """
+    if chunk_points < 1:
+        raise ValueError(f"chunk_points must be at least 1, not {chunk_points}")
+    path = Path(path)
+    scheme = None if codes is None else class_scheme(codes)
+    kind = kind_of(path)
+    if kind != "las":
+        xyz, classes = read_sample(path, kind)
+        parts = (slice(at, at + chunk_points) for at in range(0, len(xyz), chunk_points))
+        return (PointCloud(xyz[part], classes[part], scheme) for part in parts)
+    header = read_header(path)
+    crs = read_crs(header.las).crs
+    chunks = iter_records(header, chunk_points, places_only=True)
+    return (PointCloud(coordinates(c), class_codes(c), scheme, crs) for c in chunks)
+
+
+def read(path: str | Path, codes: str | None = None) -> PointCloud:
+    """A whole survey as one cloud; see ``iter_chunks`` for surveys larger than memory.
+
+    Raises:
+        InputError: as ``iter_chunks``.
+    """
+    chunks = list(iter_chunks(path, codes))
+    if len(chunks) == 1:
+        return chunks[0]
+    scheme = None if codes is None else class_scheme(codes)
+    if not chunks:
+        return PointCloud(np.empty((0, 3)), np.empty(0, np.uint8), scheme, survey_info(path).crs)
+    xyz = np.concatenate([chunk.xyz for chunk in chunks])
+    classes = np.concatenate([chunk.classification for chunk in chunks])
+    return PointCloud(xyz, classes, scheme, chunks[0].crs)
+
+
+def _triple(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

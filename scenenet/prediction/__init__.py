@@ -1,0 +1,1 @@
+"""Whole surveys: tiles with halo, towers, and every point with its probability."""

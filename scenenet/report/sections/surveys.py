@@ -1,0 +1,187 @@
+"""The sections on classified surveys, and on what everything was made from."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from scenenet.core.files import digest
+from scenenet.report.blocks import (
+    Block,
+    Column,
+    Facts,
+    Format,
+    Heading,
+    Section,
+    Table,
+    Text,
+    table,
+    write,
+)
+from scenenet.report.context import Material
+
+TOWERS_LISTED = 300
+"""A longer list is no longer read on a page; the GeoJSON has all of them."""
+
+LIBRARIES = (
+    "scenenet",
+    "torch",
+    "numpy",
+    "pandas",
+    "laspy",
+    "zarr",
+    "numba",
+    "mlflow",
+    "snakemake",
+)
+
+SUMMARY_FACTS: tuple[tuple[str, str, Format], ...] = (
+    ("points", "points", "count"),
+    ("towers", "towers", "count"),
+    ("model", "model", "text"),
+    ("tau", "tau", "score"),
+    ("voxel_size_m", "voxel [m]", "metres"),
+    ("seconds", "time", "seconds"),
+    ("crs", "CRS", "text"),
+)
+
+
+def predictions(material: Material) -> Section | None:
+    """Every classified survey with its towers."""
+    blocks: list[Block] = []
+    for survey in material.results.predicted:
+        found = material.results.prediction(survey)
+        if found is None:
+            continue
+        summary, geojson = found
+        facts = [
+            (label, write(summary[name], how))
+            for name, label, how in SUMMARY_FACTS
+            if summary.get(name) is not None
+        ]
+        blocks += [Heading(survey), Facts(facts)]
+        blocks += material.figures_of(survey, "predictions")
+        blocks.append(_tower_list(survey, geojson))
+    if not blocks:
+        return None
+    said = Text(
+        "Surveys classified by the model, with the towers it found. Nobody has confirmed them: a "
+        "tower near the edge of the data or with a low probability deserves a second look. "
+        "Positions are in the CRS of the survey; the GeoJSON files open in any GIS."
+    )
+    return Section("predictions", "Classified surveys", [said, *blocks])
+
+
+def _tower_list(survey: str, geojson: Mapping[str, Any]) -> Block:
+    import pandas as pd
+
+    features = geojson["features"]
+    if not features:
+        return Text(f"No tower was found in {survey}.")
+    rows = []
+    for feature in features[:TOWERS_LISTED]:
+        x, y = feature["geometry"]["coordinates"][:2]
+        properties = dict(feature["properties"])
+        shares = properties.pop("contributions", {})
+        rows.append({"x": x, "y": y, **properties}
+                    | {f"share.{name}": 100 * share for name, share in shares.items()})  # fmt: skip
+    frame = pd.DataFrame(rows)
+    known = [
+        Column("id", "tower", "count"),
+        Column("x", "x [m]", "metres"),
+        Column("y", "y [m]", "metres"),
+        Column("height", "height [m]", "metres"),
+        Column("base_elevation", "base elevation [m]", "metres"),
+        Column("width", "width [m]", "metres"),
+        Column("wire_directions", "directions of wires", "count"),
+        Column("probability", "probability", "score"),
+        Column("points", "points", "count"),
+        Column("edge_distance", "from the edge of the data [m]", "metres"),
+    ]
+    shares = [
+        Column(name, f"{name.removeprefix('share.').replace('_', ' ')} [%]", "share")
+        for name in frame.columns
+        if name.startswith("share.")
+    ]
+    columns = [c for c in known if c.name in frame] + shares
+    more = f" The first {TOWERS_LISTED} of {len(features)}." if len(features) > len(rows) else ""
+    caption = (
+        f"Towers found in {survey}."
+        + (" The last columns say what each GENEO added to the answer (above 0) or took from it "
+           "(below 0)." if shares else "")
+        + more
+    )  # fmt: skip
+    return table(frame, columns, caption, f"predict/{survey}/{survey}.towers.geojson")
+
+
+def provenance(material: Material) -> Section | None:
+    """Hashes and versions, for those who have to make it again."""
+    import pandas as pd
+
+    rows = [
+        {
+            "result": path,
+            "stage": made_by.get("stage"),
+            "seed": made_by.get("seed"),
+            "config": made_by.get("config"),
+            "code": made_by.get("code"),
+            "inputs": digest(made_by.get("inputs", {})),
+            "version": made_by.get("version"),
+        }
+        for path, made_by in material.results.provenances()
+    ]
+    blocks: list[Block] = [
+        Text(
+            "Each result folder has a provenance.json with the settings, the fingerprint of every "
+            "input and the hash of the code that made it. The table lists them; “inputs” is a "
+            "digest of all fingerprints."
+        ),
+        Facts([("Python", sys.version.split()[0]), *_versions()]),
+    ]
+    if rows:
+        columns = [
+            Column("result", "result"),
+            Column("stage", "stage"),
+            Column("seed", "seed", "count"),
+            Column("config", "config"),
+            Column("code", "code"),
+            Column("inputs", "inputs"),
+            Column("version", "version"),
+        ]
+        blocks.append(table(pd.DataFrame(rows), columns, "What made each result.", folded=True))
+    blocks.append(_published(material))
+    return Section("provenance", "Where everything is from", blocks)
+
+
+def _versions() -> list[tuple[str, str]]:
+    found = []
+    for name in LIBRARIES:
+        try:
+            found.append((name, version(name)))
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _published(material: Material) -> Table:
+    """Every published number, so that a reader can check what ours were put beside."""
+    columns = [
+        Column("name", "number"),
+        Column("what", "what it is"),
+        Column("value", "value", "plain", published=True),
+        Column("unit", "unit"),
+        Column("place", "place in the thesis"),
+    ]
+    rows = []
+    for name, number in material.thesis.numbers.items():
+        bounds = [write(bound, "plain") for bound in (number.low, number.high)]
+        value = write(number.value, "plain")
+        value += "" if number.spread is None else f" ± {number.spread:g}"
+        if number.low is not None or number.high is not None:
+            value += f" ({bounds[0]} to {bounds[1]})"
+        rows.append([name, number.what or "", value, number.unit or "", number.place])
+    return Table(
+        f"Published numbers: {material.thesis.source}.", columns, rows, "config/thesis.yaml", True
+    )

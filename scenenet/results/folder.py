@@ -1,0 +1,314 @@
+"""What a run has left in its result folder, read for tables, figures, MLflow and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scenenet.core.errors import InputError
+from scenenet.core.files import read_json
+from scenenet.models.settings import BOOSTED_TREES
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from scenenet.experiments.studies.settings import StudySettings
+
+HISTORY_MEASURES = frozenset({"epoch", "loss", "fidelity", "penalty", "seconds", "learning_rate"})
+"""Columns of a training history that are not parameters of the model."""
+
+
+@dataclass(frozen=True)
+class SeedResult:
+    """One model trained from one seed, tuned and evaluated.
+
+    Attributes:
+        model: name of the model in the configuration.
+        kind: architecture, ``scenenet`` or ``cnn``: what the thesis calls it.
+        seed: the seed it was trained from.
+        evaluation: scores on the test crops (``evaluate/MODEL/seed-N.json``).
+        tuning: tau and the scores on the validation crops; None before tuning.
+        history: one row per epoch; None if the model was not trained here.
+        provenance: what the training was made from.
+        resources: what the training used (``scenenet.core.peak_memory.used``).
+        model_files: the tuned model, one file or two (weights apart).
+    """
+
+    model: str
+    kind: str
+    seed: int
+    evaluation: Mapping[str, Any]
+    tuning: Mapping[str, Any] | None = None
+    history: pd.DataFrame | None = None
+    provenance: Mapping[str, Any] | None = None
+    resources: Mapping[str, Any] | None = None
+    model_files: tuple[Path, ...] = ()
+
+    @property
+    def alive(self) -> bool:
+        """Whether it detects anything at all (thesis 5.2.6: four of five CNNs do not)."""
+        return bool(self.evaluation["alive"])
+
+    @property
+    def validation(self) -> Mapping[str, Any]:
+        """Scores on the validation crops at tau; empty before tuning."""
+        return {} if self.tuning is None else self.tuning.get("validation", {})
+
+    @property
+    def epochs(self) -> int | None:
+        """Epochs it was trained for."""
+        return None if self.history is None else len(self.history)
+
+    @property
+    def seconds(self) -> float | None:
+        """Training time, s."""
+        if self.history is None or "seconds" not in self.history:
+            return None
+        return float(self.history["seconds"].sum())
+
+
+@dataclass(frozen=True)
+class Results:
+    """A result folder and what was asked for in it.
+
+    Nothing is read on construction. A stage that left nothing gives empty answers; a
+    file that is there and broken is an error.
+
+    Attributes:
+        folder: the result folder.
+        models: name of each model -> its architecture (``scenenet`` or ``cnn``).
+        seeds: seeds of the trainings.
+        surveys: surveys that make the data set.
+        predicted: surveys that were classified.
+        studies: what was studied beside.
+        contests: which of ``scenenet.experiments`` were held.
+        predicts: the model that classifies surveys; the first SCENE-Net where none is named.
+    """
+
+    folder: Path
+    models: Mapping[str, str]
+    seeds: Sequence[int]
+    surveys: Sequence[str] = ()
+    predicted: Sequence[str] = ()
+    studies: Sequence[StudySettings] = ()
+    contests: Sequence[str] = ()
+    predicts: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "folder", Path(self.folder))
+
+    @property
+    def predicting(self) -> str | None:
+        """The model that pictures and the opening of the page are about; None without models."""
+        scenenets = [model for model, kind in self.models.items() if kind == "scenenet"]
+        named = [] if self.predicts is None else [self.predicts]
+        return next(
+            (name for name in [*named, *scenenets, *self.models] if name in self.models), None
+        )
+
+    @cached_property
+    def trained(self) -> list[SeedResult]:
+        """Every model and seed that has been evaluated, in the order of the configuration."""
+        return [
+            self.seed(model, seed)
+            for model in self.models
+            for seed in self.seeds
+            if self._evaluation(model, seed).exists()
+        ]
+
+    def of_model(self, model: str) -> list[SeedResult]:
+        return [result for result in self.trained if result.model == model]
+
+    def champion(self, model: str) -> SeedResult | None:
+        """The seed with the highest F0.5 on the validation crops, the first one in a tie."""
+        tuned = [r for r in self.of_model(model) if r.validation]
+        return max(tuned, key=lambda r: r.validation["f05"], default=None)
+
+    def seed(self, model: str, seed: int) -> SeedResult:
+        """Read all there is of one training.
+
+        Raises:
+            InputError: it has not been evaluated, or a file cannot be understood.
+        """
+        training = self.folder / "train" / model / f"seed-{seed}"
+        evaluation = read_result(self._evaluation(model, seed))
+        tuning = self.folder / "tune" / model / f"seed-{seed}.json"
+        history, provenance = training / "history.csv", training / "provenance.json"
+        resources = training / "resources.json"
+        return SeedResult(
+            model=model,
+            kind=self.models[model],
+            seed=seed,
+            evaluation=evaluation,
+            tuning=read_result(tuning) if tuning.exists() else None,
+            history=read_table(history) if history.exists() else None,
+            provenance=read_result(provenance) if provenance.exists() else None,
+            resources=read_result(resources) if resources.exists() else None,
+            model_files=self._files("models", model, f"seed-{seed}"),
+        )
+
+    def scene(self, rank: str) -> Mapping[str, Any] | None:
+        """The best, median or worst test crop as voxels; None if it was not made."""
+        return self._if_there("scenes", f"{rank}.json")
+
+    def certificate(self, model: str) -> Mapping[str, Any] | None:
+        """Which promises of a GENEO a model keeps; None if it was not asked."""
+        return self._if_there("certificates", f"{model}.json")
+
+    def timing(self, model: str) -> Mapping[str, Any] | None:
+        """How long a model takes for a crop; None if it was not timed."""
+        return self._if_there("times", f"{model}.json")
+
+    def black_box_times(self) -> Mapping[str, Any] | None:
+        """How long the black box takes to train and to answer a crop."""
+        return self._if_there("black_box", "times.json")
+
+    @cached_property
+    def black_box(self) -> list[SeedResult]:
+        """The black box from every seed it was trained with."""
+        paths = [self.folder / "black_box" / f"seed-{seed}.json" for seed in self.seeds]
+        found = [(seed, p) for seed, p in zip(self.seeds, paths, strict=True) if p.exists()]
+        return [
+            SeedResult(BOOSTED_TREES, BOOSTED_TREES, seed, read_result(path))
+            for seed, path in found
+        ]
+
+    def study_runs(self, study: str) -> pd.DataFrame | None:
+        """A row per variant and seed of a study; None if it was not run."""
+        path = self.folder / "studies" / study / "runs.csv"
+        return read_table(path) if path.exists() else None
+
+    def contest_runs(self, contest: str) -> pd.DataFrame:
+        """A row per model and seed, and what else a contest varies.
+
+        Raises:
+            InputError: it has not been held.
+        """
+        return read_table(self.folder / contest / "runs.csv")
+
+    def champion_file(self, model: str) -> Path | None:
+        """The model that predicts (``models/MODEL.json``, or only ``.safetensors``)."""
+        files = self._files("models", ".", model)
+        return files[0] if files else None
+
+    def checks(self) -> dict[str, Mapping[str, Any]]:
+        """The check report of each survey, those only predicted included."""
+        surveys = dict.fromkeys([*self.surveys, *self.predicted])
+        return self._each(surveys, "check", "report.json", read_result)
+
+    def class_counts(self) -> dict[str, pd.DataFrame]:
+        """Points of each class (code, class, points, share_percent) of each survey."""
+        return self._each(self.surveys, "check", "classes.csv", read_table)
+
+    def towers(self) -> dict[str, pd.DataFrame]:
+        """The labelled towers of each survey, one row per tower."""
+        return self._each(self.surveys, "towers", "towers.csv", read_table)
+
+    def grid_times(self) -> pd.DataFrame | None:
+        """Time and size of every crop on the grids of the thesis
+        (``scenenet.evaluation.voxelisation_time``)."""
+        path = self.folder / "times" / "grids.csv"
+        return read_table(path) if path.exists() else None
+
+    def split(self) -> pd.DataFrame | None:
+        """The part of each crop (``scenenet.dataset.split``)."""
+        path = self.folder / "split" / "split.csv"
+        return read_table(path) if path.exists() else None
+
+    def prediction(self, survey: str) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
+        """Summary and tower list (GeoJSON) of a classified survey; None if it was not classified.
+
+        Raises:
+            InputError: one of the two files is there and the other is not.
+        """
+        folder = self.folder / "predict" / survey
+        summary, towers = folder / f"{survey}.summary.json", folder / f"{survey}.towers.geojson"
+        if not summary.exists() and not towers.exists():
+            return None
+        return read_result(summary), read_result(towers)
+
+    def provenances(self) -> list[tuple[str, Mapping[str, Any]]]:
+        """Every provenance record with its path in the result folder, sorted.
+
+        Those of the report and of MLflow are left out: they are made while the page is written, or
+        after it, and would make two pages of the same results differ.
+        """
+        found = []
+        for path in sorted(self.folder.glob("**/*provenance.json")):
+            place = path.relative_to(self.folder)
+            unfinished = any(part.startswith(".") for part in place.parts)
+            if not unfinished and place.parts[0] not in ("report", "mlflow"):
+                found.append((place.as_posix(), read_result(path)))
+        return found
+
+    def _if_there(self, stage: str, name: str) -> Mapping[str, Any] | None:
+        path = self.folder / stage / name
+        return read_result(path) if path.exists() else None
+
+    def _evaluation(self, model: str, seed: int) -> Path:
+        return self.folder / "evaluate" / model / f"seed-{seed}.json"
+
+    def _files(self, stage: str, folder: str, stem: str) -> tuple[Path, ...]:
+        candidates = (
+            self.folder / stage / folder / f"{stem}{s}" for s in (".json", ".safetensors")
+        )
+        return tuple(path for path in candidates if path.exists())
+
+    def _each(
+        self,
+        surveys: Iterable[str],
+        stage: str,
+        name: str,
+        read: Callable[[Path], Any],
+    ) -> dict[str, Any]:
+        paths = {survey: self.folder / stage / survey / name for survey in surveys}
+        return {survey: read(path) for survey, path in paths.items() if path.exists()}
+
+
+def parameter_columns(history: pd.DataFrame) -> list[str]:
+    """Columns of a training history that hold parameters of the model, such as ``cylinder.r``."""
+    return [
+        name
+        for name in history.columns
+        if name not in HISTORY_MEASURES and not name.startswith(("train_", "validation_"))
+    ]
+
+
+def read_result(path: Path) -> Mapping[str, Any]:
+    """A JSON result.
+
+    Raises:
+        InputError: the file is missing or is not a JSON object.
+    """
+    try:
+        data = read_json(path)
+    except OSError as error:
+        raise _unreadable(path, error.strerror or "cannot be read") from None
+    except ValueError as error:
+        raise _unreadable(path, f"is not JSON ({error})") from None
+    if not isinstance(data, Mapping):
+        raise _unreadable(path, "is not a JSON object")
+    return data
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """A CSV result.
+
+    Raises:
+        InputError: the file is missing or is not a table.
+    """
+    import pandas as pd
+
+    try:
+        return pd.read_csv(path)
+    except OSError as error:
+        raise _unreadable(path, error.strerror or "cannot be read") from None
+    except ValueError as error:
+        raise _unreadable(path, f"is not a table ({error})") from None
+
+
+def _unreadable(path: Path, problem: str) -> InputError:
+    return InputError(problem, file=path, remedy="Delete it and run the workflow again")

@@ -1,0 +1,232 @@
+"""Tables of what models are: times, numbers in metres, certificates (thesis 5.2.2, 5.2.6, 3.4).
+
+As in ``scenenet.results.tables``: every function returns a data frame for one CSV, and spread is
+the sample standard deviation over seeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from scenenet.experiments.published import Thesis
+from scenenet.interpretability.parameter_sentences import Parameter, parameters_of, sentences
+from scenenet.results.folder import BOOSTED_TREES, Results
+from scenenet.results.initial_models import start_of
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from scenenet.models.scenenet import SceneNet
+
+SYMBOLS = {"sigma": "σ", "beta": "β", "omega": "ω", "lambda": "λ"}
+"""Names of parameters -> how the thesis writes them."""
+
+
+def times(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """Time and memory of training and of inference (thesis 5.2.6), whatever machine this ran on.
+
+    ``useful_seconds`` is the time until a training that detects anything can be expected: that of
+    one training over the share of them that do. ``inference_ms`` is of 64^3 voxels and
+    ``inference_ms_128`` of 128^3 (``scenenet.evaluation.inference_time``), ``peak_memory_mb`` the
+    largest over the seeds (``scenenet.core.peak_memory``).
+    """
+    import pandas as pd
+
+    columns = ["model", "n_seeds", "epochs", "training_seconds", "training_seconds_std",
+               "seconds_per_epoch", "live_share", "useful_seconds", "peak_memory_mb",
+               "inference_ms", "inference_ms_128", "thesis_training_seconds",
+               "thesis_useful_seconds", "thesis_inference_ms"]  # fmt: skip
+    rows: list[dict[str, Any]] = []
+    for model, kind in results.models.items():
+        trained = results.of_model(model)
+        timed = [r for r in trained if r.seconds is not None]
+        if not timed:
+            continue
+        epochs = pd.Series([r.epochs for r in timed], dtype=float)
+        seconds = [float(r.seconds or 0) for r in timed]
+        peaks = [r.resources.get("peak_memory_mb") for r in timed if r.resources]
+        row = _training(seconds, sum(r.alive for r in trained) / len(trained))
+        row |= {"model": model, "epochs": epochs.mean(), "peak_memory_mb": _largest(peaks)}
+        row["seconds_per_epoch"] = sum(seconds) / epochs.sum()
+        row |= _inference(results.timing(model))
+        row["thesis_training_seconds"] = _scaled(thesis.value("times.training"), 60)
+        row["thesis_useful_seconds"] = _scaled(thesis.value(f"times.{kind}.training_useful"), 3600)
+        row["thesis_inference_ms"] = thesis.value(f"times.{kind}.inference")
+        rows.append(row)
+    trees = results.black_box_times()
+    if trees is not None:
+        live = [r.alive for r in results.black_box]
+        row = _training(trees["training_seconds"], sum(live) / max(1, len(live)))
+        row |= {"model": BOOSTED_TREES, "peak_memory_mb": trees.get("peak_memory_mb")}
+        rows.append(row | _inference(trees))
+    return pd.DataFrame(rows, columns=columns)
+
+
+def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """The numbers of each SCENE-Net after training in metres, each with a sentence (Figure 5.5).
+
+    Numbers of kernels in voxels are multiplied by the voxel size that each was trained on.
+    ``initial`` is the mean of what the seeds began with, ``initial_from`` how that is known
+    (``scenenet.results.initial_models``).
+    """
+    import pandas as pd
+
+    from scenenet.geneo.sentences import Surroundings
+
+    columns = ["model", "parameter", "symbol", "unit", "mean", "std", "n_seeds", "initial",
+               "initial_from", "thesis", "sentence"]  # fmt: skip
+    rows: list[dict[str, Any]] = []
+    for model in results.models:
+        found = numbers_in_metres(results, model)
+        if found is None:
+            continue
+        means = found.after.mean()
+        beside = Surroundings(found.step, _tower_width(results))
+        said = sentences(found.network, means.to_dict(), beside)
+        for parameter in found.parameters:
+            name = parameter.name
+            rows.append(
+                {
+                    "model": model,
+                    "parameter": name,
+                    "symbol": SYMBOLS.get(parameter.symbol, parameter.symbol),
+                    "unit": parameter.unit,
+                    "mean": means[name],
+                    "std": found.after[name].std(),
+                    "n_seeds": len(found.after),
+                    "initial": found.before[name].mean() if name in found.before else None,
+                    "initial_from": found.began,
+                    "thesis": _scaled(_published(thesis, name), 0.01),
+                    "sentence": said[name],
+                }
+            )
+    return pd.DataFrame(rows, columns=columns)
+
+
+class Numbers(NamedTuple):
+    """The numbers of a SCENE-Net from every seed, in metres.
+
+    Attributes:
+        network: one of the trained models.
+        parameters: names and units, in their order.
+        after: a row a seed, a column a parameter.
+        before: the same at the start; no columns where nobody knows it.
+        began: how ``before`` is known.
+        step: m, what the height of a kernel is counted in.
+    """
+
+    network: SceneNet
+    parameters: list[Parameter]
+    after: pd.DataFrame
+    before: pd.DataFrame
+    began: str
+    step: float
+
+
+def numbers_in_metres(results: Results, model: str) -> Numbers | None:
+    """The numbers of one SCENE-Net; None where it has no tuned file, or is none."""
+    import pandas as pd
+
+    from scenenet.models.model_file import read_model
+    from scenenet.models.scenenet import SceneNet
+
+    after, before, began, sizes = [], [], set(), []
+    network, known = None, []
+    for result in results.of_model(model):
+        trained, card = read_model(result.model_files[0]) if result.model_files else (None, None)
+        if not isinstance(trained, SceneNet) or card is None:
+            continue
+        network, known = trained, parameters_of(trained, card.voxel_size)
+        after.append(_scaled_all(known, trained.shape_parameters()))
+        sizes.append(card.voxel_size)
+        start = start_of(result, trained)
+        if start is not None and isinstance(start.model, SceneNet):
+            before.append(_scaled_all(known, start.model.shape_parameters()))
+            began.add(start.said)
+    if network is None:
+        return None
+    step = 1.0 if network.field is not None else sum(sizes) / len(sizes)
+    said = "; ".join(sorted(began))
+    return Numbers(network, known, pd.DataFrame(after), pd.DataFrame(before), said, step)
+
+
+def _scaled_all(known: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, float]:
+    return {parameter.name: parameter.factor * values[parameter.name] for parameter in known}
+
+
+def certificate(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
+    """Which promises of a GENEO each model that predicts keeps, one row per property.
+
+    ``value`` is the number that goes with the property, ``found`` says it in words.
+    """
+    import pandas as pd
+
+    columns = ["model", "kind", "seed", "property", "thesis", "holds", "value", "found"]
+    rows = []
+    for model in results.models:
+        known = results.certificate(model) or {"statements": []}
+        for statement in known["statements"]:
+            rows.append(
+                {
+                    "model": model,
+                    "kind": known["kind"],
+                    "seed": known["seed"],
+                    **{name: statement[name] for name in ("property", "thesis", "holds", "value")},
+                    "found": statement["text"],
+                }
+            )
+    return pd.DataFrame(rows, columns=columns)
+
+
+def turns(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
+    """How far the answers of each model move when the scene is turned about z, or shifted by half a
+    voxel (``degrees`` empty), one row per turn."""
+    import pandas as pd
+
+    columns = ["model", "degrees", "mean_h", "mean_m", "largest_m", "decided_otherwise"]
+    rows = []
+    for model in results.models:
+        known = results.certificate(model)
+        moved = [] if known is None else [known["half_voxel"], *known["turns"]]
+        rows += [{"model": model} | {name: one[name] for name in columns[1:]} for one in moved]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _training(seconds: Sequence[float], live_share: float) -> dict[str, Any]:
+    import pandas as pd
+
+    each = pd.Series(seconds, dtype=float)
+    return {
+        "n_seeds": len(each),
+        "training_seconds": each.mean(),
+        "training_seconds_std": each.std(),
+        "live_share": live_share,
+        "useful_seconds": each.mean() / live_share if live_share else None,
+    }
+
+
+def _inference(timing: Mapping[str, Any] | None) -> dict[str, float | None]:
+    took = {} if timing is None else timing["inference_ms"]
+    return {"inference_ms": took.get("64"), "inference_ms_128": took.get("128")}
+
+
+def _largest(values: Sequence[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else factor * value
+
+
+def _published(thesis: Thesis, parameter: str) -> float | None:
+    """The thesis' number in per cent; only mixing weights have one."""
+    return thesis.value(f"parameters.{parameter.replace('.', '_')}")
+
+
+def _tower_width(results: Results) -> float | None:
+    """Mean width of the labelled towers, m."""
+    import pandas as pd
+
+    tables = [table for table in results.towers().values() if len(table)]
+    return float(pd.concat(tables)["width"].mean()) if tables else None

@@ -1,0 +1,1 @@
+"""What the scanner sees of a synthetic corridor: flight, pulses, returns."""

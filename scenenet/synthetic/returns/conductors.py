@@ -1,0 +1,147 @@
+"""Conductors, earth wires and the cables of other lines."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenenet.synthetic.returns.flight import Flight
+from scenenet.synthetic.scene.line import Support
+from scenenet.synthetic.scene.random_fields import Raster
+from scenenet.synthetic.scene.strip import Strip
+from scenenet.synthetic.settings import TALL, WIRE, SyntheticSettings
+
+BUNDLE_M = 0.4
+"""Distance of the wires of a bundle."""
+
+CABLE_SAG = 0.02
+"""Sag of the cables of other lines, over their span."""
+
+
+def catenary(start: np.ndarray, end: np.ndarray, parameter: float, u: np.ndarray) -> np.ndarray:
+    """Points (N, 3) of a wire hanging between ``start`` and ``end`` (3,), at shares ``u`` of the
+    horizontal way (N,).
+
+    z = c cosh((s - s0) / c) + k with the catenary parameter c = tension / weight per metre (m);
+    s0 and k follow from the two ends, which may lie at different heights.
+    """
+    step = end - start
+    length = float(np.hypot(step[0], step[1]))
+    half = length / (2 * parameter)
+    lowest = length / 2 - parameter * np.arcsinh(step[2] / (2 * parameter * np.sinh(half)))
+    s = u * length
+    z = parameter * (np.cosh((s - lowest) / parameter) - np.cosh(lowest / parameter))
+    return np.column_stack((start[0] + u * step[0], start[1] + u * step[1], start[2] + z))
+
+
+def string_wires(
+    starts: np.ndarray,
+    ends: np.ndarray,
+    parameter: float,
+    step: float,
+    share: float,
+    rng: np.random.Generator,
+    window: tuple[float, float] = (0.0, 1.0),
+) -> np.ndarray:
+    """Points (N, 3) of the wires from ``starts`` to ``ends`` (W, 3), where scan lines meet them.
+
+    Args:
+        step: distance of two scan lines, m.
+        share: of the scan lines that give a point.
+        window: only this part of the way is scanned (shares of the horizontal way).
+    """
+    points = []
+    for start, end in zip(starts, ends, strict=True):
+        length = max(float(np.hypot(*(end - start)[:2])), step)
+        at = np.arange(window[0] * length, window[1] * length, step)
+        at = at[rng.random(len(at)) < share]
+        at = at + 0.2 * step * rng.standard_normal(len(at))
+        u = np.clip(at / length, *window)
+        points.append(catenary(start, end, parameter, u))
+    return np.concatenate(points)
+
+
+def bundled(attachments: np.ndarray, azimuth: float, bundle: int, conductors: int) -> np.ndarray:
+    """The wires (V, 3) that hang at ``attachments`` (W, 3), m: the first ``conductors`` are
+    bundles of ``bundle`` wires, side by side and in pairs one above the other."""
+    if bundle == 1:
+        return attachments
+    right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
+    half = BUNDLE_M / 2
+    places = {
+        2: [(-half, 0.0), (half, 0.0)],
+        3: [(-half, 0.0), (half, 0.0), (0.0, -BUNDLE_M)],
+        4: [(-half, 0.0), (half, 0.0), (-half, -BUNDLE_M), (half, -BUNDLE_M)],
+    }[bundle]
+    wires = [
+        held + across * right + np.array([0.0, 0.0, down])
+        for held in attachments[:conductors] for across, down in places
+    ]  # fmt: skip
+    return np.array([*wires, *attachments[conductors:]])
+
+
+def wire_points(
+    strip: Strip,
+    before: Support,
+    after: Support,
+    span: float,
+    flight: Flight,
+    settings: SyntheticSettings,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (N, 3) and codes (N,) of the line's own wires in a strip."""
+    conductors = 3 * settings.circuits
+    starts, ends = (
+        bundled(tower.attachments, tower.azimuth, settings.bundle, conductors)
+        for tower in (before, after)
+    )
+    window = (strip.low / span, strip.high / span)
+    points = string_wires(
+        starts,
+        ends,
+        settings.catenary,
+        flight.line_step / flight.on_line,
+        flight.wires,
+        rng,
+        window,
+    )
+    points += 0.7 * settings.ranging_noise * rng.standard_normal(points.shape)
+    return points, np.full(len(points), WIRE, np.uint8)
+
+
+def other_cables(
+    strip: Strip,
+    terrain: Raster,
+    flight: Flight,
+    settings: SyntheticSettings,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (N, 3) and codes (N,) of low cables: telephone, street lights, houses.
+
+    Annotators saw to the main line alone: other cables are in 12, as all that is tall.
+    """
+    count = rng.poisson(settings.other_lines * (strip.high - strip.low) / 1000.0)
+    parts = [np.empty((0, 3))]
+    for _ in range(count):
+        s = rng.uniform(strip.low, strip.high)
+        t = rng.uniform(-strip.half_width, strip.half_width)
+        azimuth = strip.azimuth + rng.uniform(0, np.pi)
+        half = rng.uniform(15.0, 25.0)
+        x, y = strip.to_map(s, t)
+        ends = np.array([[x, y], [x, y]]) + half * np.array([[-1], [1]]) * [
+            np.cos(azimuth), np.sin(azimuth)
+        ]  # fmt: skip
+        # The ground is known near the strip only; beyond it the cable goes on as the slope does.
+        z0 = float(terrain.bilinear(np.array([x]), np.array([y]))[0])
+        height = rng.uniform(4.5, 8.5)
+        tilt = rng.uniform(-0.08, 0.08) * half
+        starts = np.column_stack((ends, [z0 + height - tilt, z0 + height + tilt]))
+        parameter = 2 * half / (8 * CABLE_SAG)
+        for down in (0.0, 0.35)[: rng.integers(1, 3)]:
+            hung = starts - [0, 0, down]
+            parts.append(
+                string_wires(hung[:1], hung[1:], parameter, flight.line_step, flight.wires, rng)
+            )
+    points = np.concatenate(parts)
+    points = points[strip.holds(points[:, 0], points[:, 1])]
+    points += 0.7 * settings.ranging_noise * rng.standard_normal(points.shape)
+    return points, np.full(len(points), TALL, np.uint8)

@@ -1,0 +1,126 @@
+"""What a scanner in a helicopter gets back from ground, vegetation and roofs.
+
+Pulses fall in scan lines. Each comes from where the helicopter flies, down through the crowns: it
+returns from foliage that it meets, a few times at most, from a roof or wall, which ends it, or from
+the ground and what grows on it. So what lies behind a crown or a house is seen less or not at all.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scenenet.synthetic.returns.flight import Flight
+from scenenet.synthetic.returns.pulse import CEILING_CELL_M, FOLIAGE, FOLIATED, MOST_RETURNS, STEP_M
+from scenenet.synthetic.scene.ground_cover import Cover
+from scenenet.synthetic.scene.random_fields import Raster, field_seed
+from scenenet.synthetic.scene.strip import Strip
+from scenenet.synthetic.scene.vegetation import Canopy
+from scenenet.synthetic.settings import SyntheticSettings
+
+BLOCK_PULSES = 100_000
+"""Pulses that are worked on at a time: memory does not grow with the length of a span."""
+
+
+class Scanner:
+    """The scanner of one survey."""
+
+    def __init__(self, settings: SyntheticSettings) -> None:
+        from scipy.ndimage import gaussian_filter
+
+        self._settings = settings
+        rng = np.random.default_rng(field_seed(settings.seed, "foliage"))
+        block = gaussian_filter(rng.standard_normal((FOLIAGE,) * 3), (1.1, 1.6, 1.6), mode="wrap")
+        self._foliage = block > np.quantile(block, 1 - FOLIATED)
+        per_metre = -np.log(np.clip(settings.penetration, 1e-3, 0.999)) / 5.0
+        self._hit = 1 - np.exp(-per_metre * STEP_M / FOLIATED)
+
+    def scan(
+        self,
+        strip: Strip,
+        flight: Flight,
+        terrain: Raster,
+        canopy: Canopy,
+        solid: Raster,
+        cover: Cover,
+        key: int,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Points (N, 3) and codes (N,) of one strip.
+
+        Args:
+            terrain: elevation of the ground, m.
+            canopy: what grows there.
+            solid: height of roofs above the ground, m; 0 where there is none. Its cells are those
+                of the canopy.
+            key: a number of this strip, for its random numbers.
+        """
+        from scenenet.synthetic.returns.sweep import sweep
+
+        settings = self._settings
+        x, y = canopy.top.nodes()
+        ground = terrain.bilinear(x.ravel(), y.ravel()).reshape(x.shape)
+        top = np.where(canopy.top.values > 0, ground + canopy.top.values, -np.inf)
+        bottom = ground + canopy.bottom.values
+        roof = np.where(solid.values > 0, ground + solid.values, -np.inf)
+        # Side by side in memory: a pulse looks at all four of a cell.
+        columns = np.stack(
+            [top, bottom, roof, canopy.leaves.values],
+            axis=-1,
+            dtype=np.float32,
+            casting="same_kind",
+        )
+        tallest = np.maximum(canopy.top.values, solid.values)
+        # How far a pulse can come from across on its way down through the tallest tree.
+        lean = (strip.half_width + abs(flight.offset)) / flight.height
+        reach = lean * float(tallest.max())
+        ceiling, ci, cj = _ceiling(tallest, canopy.top, reach)
+        marked = np.zeros((3, *terrain.values.shape), np.bool_)
+        frame = np.array(
+            [strip.x, strip.y, np.cos(strip.azimuth), np.sin(strip.azimuth), strip.low, strip.high,
+             strip.k0, strip.k1, strip.half_width]
+        )  # fmt: skip
+        points, codes = [], []
+        for number, (start, end) in enumerate(flight.passes):
+            lines = int((strip.last - strip.first + 2 * abs(flight.skew) * strip.half_width)
+                        / flight.line_step) + 2  # fmt: skip
+            # Pulses that come down outside may have met a crown inside.
+            start, end = start - reach, end + reach
+            pulses = int((end - start) / flight.pulse_step) + 1
+            per_block = max(1, BLOCK_PULSES // pulses)
+            path = np.array(
+                [strip.first - abs(flight.skew) * strip.half_width, start, flight.line_step,
+                 flight.pulse_step, flight.skew, flight.sway, flight.offset, flight.height]
+            )  # fmt: skip
+            seed = np.uint64(field_seed(settings.seed, f"pulses {key} {number}"))
+            for first in range(0, lines, per_block):
+                last = min(first + per_block, lines)
+                xyz = np.empty(((last - first) * pulses * (MOST_RETURNS + 1), 3))
+                code = np.empty(len(xyz), np.uint8)
+                n = sweep(
+                    first, last, pulses, seed, frame, path,
+                    terrain.values, terrain.i, terrain.j,
+                    columns, flight.depths, canopy.top.i, canopy.top.j, canopy.top.step,
+                    ceiling, ci, cj, self._foliage, self._hit,
+                    cover.grass.values, cover.tallness.values, cover.rise.values,
+                    cover.water.values, cover.grass.i, cover.grass.j, cover.grass.step,
+                    settings.ranging_noise, marked, xyz, code,
+                )  # fmt: skip
+                points.append(xyz[:n].copy())
+                codes.append(code[:n].copy())
+        return np.concatenate(points), np.concatenate(codes)
+
+
+def _ceiling(tallest: np.ndarray, raster: Raster, reach: float) -> tuple[np.ndarray, int, int]:
+    """Greatest height above the ground within ``reach`` of each cell of ``CEILING_CELL_M``."""
+    from scipy.ndimage import maximum_filter
+
+    per = round(CEILING_CELL_M / raster.step)
+    i0, j0 = raster.i // per, raster.j // per
+    rows = (raster.j + tallest.shape[0] - 1) // per - j0 + 1
+    columns = (raster.i + tallest.shape[1] - 1) // per - i0 + 1
+    full = np.zeros((rows * per, columns * per))
+    r, c = raster.j - j0 * per, raster.i - i0 * per
+    full[r : r + tallest.shape[0], c : c + tallest.shape[1]] = tallest
+    ceiling = full.reshape(rows, per, columns, per).max(axis=(1, 3))
+    # Cells around: a pulse enters from the side.
+    size = 2 * int(np.ceil(reach / CEILING_CELL_M)) + 1
+    return maximum_filter(ceiling, size), i0, j0

@@ -1,0 +1,1 @@
+"""What stands in a synthetic corridor: terrain, vegetation, towers, the line."""

@@ -1,0 +1,52 @@
+"""A tuned model as MLflow serves it: a batch of voxel grids in, probabilities out.
+
+MLflow keeps this file beside the model file and runs it where the model is loaded, so there is no
+pickle, and ``mlflow.pyfunc.load_model`` needs nothing but the package.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mlflow.models import set_model
+from mlflow.pyfunc import PythonModel
+
+
+class TowerModel(PythonModel):
+    """Probability of each voxel to hold a tower (thesis 4.3)."""
+
+    def load_context(self, context: Any) -> None:
+        from scenenet.models.model_file import read_model
+
+        model, card = read_model(context.artifacts["model"])
+        self.model = model.at(card.voxel_size)
+
+    def predict(
+        self, context: Any, model_input: np.ndarray, params: dict[str, Any] | None = None
+    ) -> np.ndarray:
+        """Probabilities of a batch of any size.
+
+        Args:
+            model_input: (B, D, H, W) measurement phi of each voxel, 0 where it is empty; axes
+                z (up), y, x. Presence or density, in voxels of the size the model was trained at.
+
+        Returns:
+            (B, D, H, W) float32 in [0, 1]; the tower voxels are those of at least the model's tau.
+        """
+        import torch
+
+        from scenenet.convolution.occupancy import Occupancy
+
+        grids = np.asarray(model_input)
+        if grids.ndim != 4:
+            raise ValueError(f"a batch of grids is (B, D, H, W), not {grids.shape}")
+        flat = grids.reshape(len(grids), -1)
+        indices = [np.flatnonzero(grid) for grid in flat]
+        values = [grid[index] for grid, index in zip(flat, indices, strict=True)]
+        shape = (grids.shape[1], grids.shape[2], grids.shape[3])
+        with torch.no_grad():
+            return self.model(Occupancy.of_grids(indices, values, shape)).numpy()
+
+
+set_model(TowerModel())

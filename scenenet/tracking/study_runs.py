@@ -1,0 +1,131 @@
+"""A study as an MLflow experiment of its own: a parent for each variant, a run for each seed."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from scenenet.experiments.studies.settings import StudySettings
+from scenenet.experiments.studies.summary import SCORES
+from scenenet.tracking.model_runs import origin_tags
+from scenenet.tracking.run_log import NOTE_TAG, RunGroup, RunRecord
+from scenenet.tracking.store import TrackingSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from scenenet.figures import Picture
+
+FACTS = (
+    "tau", "alive", "training_crops", "parameters", "epochs", "loss", "training_seconds",
+    "inference_ms", "lowest_weight", "lowest_shape",
+)  # fmt: skip
+
+GIVEN = ("training_crops", "parameters", "epochs")
+"""Facts that a variant sets, so that they have no spread."""
+
+
+def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
+    """The settings with the study's own experiment, so that its runs are compared by themselves."""
+    return settings.model_copy(update={"experiment": f"{settings.experiment}-{study}"})
+
+
+def note_of(study: StudySettings) -> str:
+    """What the experiment of a study says of itself."""
+    return f"{study.title}. {study.asks} Thesis {study.place}; scores on the {study.part} crops."
+
+
+def study_groups(
+    study: StudySettings,
+    runs: pd.DataFrame,
+    dataset: str,
+    protocol: str = "",
+    provenance: Mapping[str, Any] | None = None,
+    pictures: Sequence[Picture] = (),
+) -> list[RunGroup]:
+    """The runs of a study.
+
+    Args:
+        runs: of ``scenenet.experiments.studies.run``, a row per variant and seed.
+        dataset: name of the data, part of every key, so that runs on other data stand beside.
+        protocol: how the data were split and voxelised, in words, for a tag.
+        provenance: what the study was made from and by, for tags.
+        pictures: figures of the whole study, attached to every variant.
+    """
+    tags = {
+        "study": study.name,
+        "dataset": dataset,
+        "protocol": protocol,
+        "place": study.place,
+        "model": study.model,
+        **origin_tags(provenance or {}),
+    }
+    groups = []
+    for variant in study.all_variants():
+        rows = runs[runs["variant"] == variant.name].to_dict("records")
+        if not rows:
+            continue
+        key = f"study-{study.name}/{dataset}/{variant.name}"
+        params = {
+            "variant": variant.name,
+            **{
+                name: json.dumps(value) if isinstance(value, list | tuple) else value
+                for name, value in (study.common | variant.changes).items()
+            },
+        }
+        children = [
+            RunRecord(
+                key=f"{key}/seed-{row['seed']}",
+                name=f"{variant.name}, seed {row['seed']}",
+                params=params | {"seed": row["seed"]},
+                metrics=_metrics(row, study.part),
+                tags=tags
+                | {
+                    "kind": str(row["kind"]),
+                    "variant": variant.name,
+                    "seed": str(row["seed"]),
+                    "alive": str(bool(row["alive"])).lower(),
+                },
+                seconds=float(row["training_seconds"]),
+            )
+            for row in rows
+        ]
+        parent = RunRecord(
+            key=key,
+            name=variant.name,
+            params=params,
+            metrics=_means([child.metrics for child in children]),
+            tags=tags
+            | {
+                "kind": str(rows[0]["kind"]),
+                "variant": variant.name,
+                NOTE_TAG: f"{study.asks} Mean over {len(rows)} seeds; thesis {study.place}.",
+            },
+            artifacts={f"figures/{picture.file.name}": picture.file for picture in pictures},
+            seconds=sum(child.seconds for child in children),
+        )
+        groups.append(RunGroup(parent, children))
+    return groups
+
+
+def _metrics(row: Mapping[str, Any], part: str) -> dict[str, float | None]:
+    # MLflow's plots begin with the first: it is the one that the thesis chooses by.
+    scores = sorted((*SCORES, "average_precision"), key=lambda name: name != "f05")
+    metrics: dict[str, float | None] = {f"{part}_{name}": float(row[name]) for name in scores}
+    return metrics | {name: float(row[name]) for name in FACTS}
+
+
+def _means(seeds: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:
+    """Means under the names of the seeds' own metrics, so that both stand in one column."""
+    means: dict[str, float | None] = {}
+    for name in seeds[0]:
+        values = [v for seed in seeds if (v := seed[name]) is not None and not math.isnan(v)]
+        if values:
+            mean = sum(values) / len(values)
+            means[name] = mean
+            if len(values) > 1 and name not in GIVEN:
+                square = sum((value - mean) ** 2 for value in values)
+                means[f"{name}_std"] = math.sqrt(square / (len(values) - 1))
+    return means | {"seeds": len(seeds)}

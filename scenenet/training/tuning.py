@@ -1,0 +1,104 @@
+"""What is chosen on the validation part: tau, the kernel size, the seed (thesis 5.2.4.1, 5.2.7)."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from scenenet.core.files import atomic, read_json, write_json
+from scenenet.dataset.split import crops_in
+from scenenet.dataset.voxel_cache import load
+from scenenet.dataset.voxels import VoxelSample
+from scenenet.metrics.threshold_curve import curve_columns
+from scenenet.models.answers import threshold_curve
+from scenenet.models.base import VoxelModel
+from scenenet.models.model_file import ModelCard, read_model, write_model
+from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import TuningSettings
+from scenenet.training.objective import best_step
+
+
+def tune(
+    model: str | Path,
+    voxel_manifests: Sequence[str | Path],
+    split: str | Path,
+    settings: TuningSettings,
+    out_model: str | Path,
+    out_json: str | Path,
+) -> dict[str, Any]:
+    """Choose tau and kernel size by F0.5 on the validation part and write the tuned model.
+
+    Returns:
+        tau, kernel_size, the validation scores there, the scores at every tau (``curve``) and the
+        best of every kernel size tried (``kernel_sizes``).
+    """
+    trained, card = read_model(model)
+    samples = load(voxel_manifests, crops_in(split, "validation")).samples
+    learnt: Sequence[VoxelSample] = ()
+    if trained.field is not None:
+        learnt = load(voxel_manifests, crops_in(split, "train")).samples
+    tuned, card, result = choose(trained, card, samples, settings, learnt)
+    write_model(out_model, tuned, card)
+    write_json(out_json, result)
+    return result
+
+
+def choose(
+    model: VoxelModel,
+    card: ModelCard,
+    validation: Sequence[VoxelSample],
+    settings: TuningSettings,
+    learnt: Sequence[VoxelSample] = (),
+) -> tuple[VoxelModel, ModelCard, dict[str, Any]]:
+    """The model at its best kernel size, its card with tau, and the result of ``tune``.
+
+    Args:
+        learnt: crops it was trained on. tau of a SCENE-Net in metres is chosen on these as well:
+            eleven numbers hardly know them by heart, and a single validation crop is too little to
+            choose by. The scores are those of the validation part all the same.
+    """
+    candidates: list[VoxelModel] = [model]
+    field = model.field
+    if isinstance(model, SceneNet) and field is None:
+        sizes = [size for size in settings.kernel_sizes if size != model.kernel_size]
+        candidates += [model.with_kernel_size(size) for size in sizes]
+    tried = []
+    for candidate in candidates:
+        curve = threshold_curve(candidate, validation, card.measurement)
+        if field is None:
+            tau, counts = curve.best()
+        else:
+            both = curve + threshold_curve(candidate, learnt, card.measurement)
+            step, _ = best_step(both, field.false_weight)
+            tau, counts = float(curve.tau[step]), curve.confusion(step)
+        tried.append((counts.f05, tau, candidate, curve, counts))
+    # The size it was trained with comes first and wins a tie.
+    _, tau, tuned, curve, counts = max(tried, key=lambda entry: entry[0])
+    result = {
+        "model": card.name,
+        "tau": tau,
+        "kernel_size": list(tuned.kernel_size),
+        "validation": counts.scores() | {"tau": tau, "n_samples": len(validation)},
+        "curve": curve_columns(curve),
+        "kernel_sizes": [
+            {"kernel_size": list(c.kernel_size), "tau": t, **n.scores()} for _, t, c, _, n in tried
+        ],
+    }
+    return tuned, card.with_tau(tau), result
+
+
+def champion(
+    models: Sequence[str | Path], tunings: Sequence[str | Path], out_model: str | Path
+) -> dict[str, Any]:
+    """Copy the model with the highest validation F0.5; the first of equals.
+
+    Args:
+        models, tunings: outputs of ``tune``, in the same order.
+    """
+    results = [read_json(path) for path in tunings]
+    best = max(range(len(results)), key=lambda i: results[i]["validation"]["f05"])
+    with atomic(out_model) as partial:
+        shutil.copyfile(models[best], partial)
+    return {"chosen": Path(models[best]).name, "validation": results[best]["validation"]}

@@ -1,0 +1,216 @@
+"""The command line, called as a user calls it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenenet.cli.options import Codes
+from scenenet.pointcloud import SCHEMES
+
+
+def scenenet(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-c", "from scenenet.cli.app import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+    )
+
+
+@pytest.fixture(scope="module")
+def survey(tmp_path_factory) -> Path:
+    """A small synthetic corridor with its truth."""
+    out = tmp_path_factory.mktemp("survey") / "corridor.laz"
+    made = scenenet("synth", out, "--towers", 4, "--seed", 5, "--truth", out.with_name("truth.laz"))
+    assert made.returncode == 0, made.stderr
+    return out
+
+
+@pytest.fixture(scope="module")
+def model(survey, tmp_path_factory) -> Path:
+    """A model trained on it for a moment, and what was answered on the way."""
+    out = tmp_path_factory.mktemp("model") / "model.json"
+    made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
+                    "--seeds", 2, "--json")  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    answer = json.loads(made.stdout)
+    assert answer["crops"] == {"training": 4, "validation": 0}
+    assert answer["tuned_on"] == "training"
+    assert len(answer["seeds"]) == 2
+    assert "generations" in made.stderr
+    assert json.loads(out.read_text())["units"] == "m"
+    made_by = json.loads(out.read_text())["provenance"]
+    assert {"seed", "data", "config", "version", "files"} <= made_by.keys()
+    return out
+
+
+def test_the_protocol_of_the_thesis_can_be_asked_for(survey, tmp_path):
+    out = tmp_path / "thesis.json"
+    made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
+                    "--protocol", "thesis", "--epochs", 2, "--seeds", 1, "--json")  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    assert json.loads(made.stdout)["crops"] == {"training": 3, "validation": 1}
+    assert json.loads(out.read_text())["units"] == "voxel"
+
+
+def test_every_command_explains_itself():
+    for command in ("check", "synth", "train", "predict", "evaluate", "explain"):
+        shown = scenenet(command, "--help")
+        assert shown.returncode == 0
+        assert "Options:" in shown.stdout and "--json" in shown.stdout
+
+
+def test_a_synthetic_survey_has_as_many_points_as_its_truth(survey):
+    reports = json.loads(scenenet("check", survey, survey.with_name("truth.laz"), "--json").stdout)
+    assert reports[0]["n_points"] == reports[1]["n_points"] > 100_000
+
+
+def test_check_prints_a_table_for_people(survey):
+    shown = scenenet("check", survey, "--codes", "edp")
+    assert shown.returncode == 0
+    assert "Power line support tower" in shown.stdout
+
+
+def test_predict_writes_the_three_files_of_a_survey(survey, model, tmp_path):
+    done = scenenet("predict", survey, "--model", model, "--out", tmp_path, "--json")
+    assert done.returncode == 0, done.stderr
+    names = {f.name for f in tmp_path.iterdir()}
+    assert names == {"corridor.laz", "corridor.towers.geojson", "corridor.summary.json"}
+    summary = json.loads((tmp_path / "corridor.summary.json").read_text())
+    assert json.loads(done.stdout) == [summary]
+
+
+def test_evaluate_answers_with_the_scores_of_the_contract(survey, model):
+    done = scenenet("evaluate", survey, "--model", model, "--codes", "edp",
+                    "--resolution", 32, "--json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    scores = json.loads(done.stdout)
+    assert set(scores["voxel"]) == {
+        "precision", "recall", "f05", "iou_tower", "miou", "tau", "n_samples",
+    }  # fmt: skip
+    assert scores["voxel"]["n_samples"] == len(scores["per_sample"]) == 4
+    assert scores["voxel_trivial"]["f05"] == 0
+    assert scores["voxel_trivial"]["miou"] == pytest.approx(0.5, abs=0.01)
+    assert set(scores["towers"]) == {
+        "precision", "recall", "median_error_m", "n_true", "n_predicted",
+    }  # fmt: skip
+
+
+def test_evaluate_at_the_models_voxel_size_looks_through_the_whole_survey(survey, model):
+    done = scenenet("evaluate", survey, "--model", model, "--codes", "edp", "--fit", "metric",
+                    "--json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["towers"]["n_true"] == 4
+
+
+@pytest.mark.parametrize("command", ["predict", "evaluate", "explain"])
+def test_towers_without_wires_can_be_asked_for(command, model, tmp_path):
+    shown = scenenet(command, "--help")
+    assert "--min-wire" in shown.stdout
+    refused = scenenet(command, "nowhere.laz", "--model", model, "--min-wire", "-1")
+    assert refused.returncode == 2
+    assert "--min-wire" in refused.stderr
+
+
+def test_what_is_asked_of_wires_is_written_down(survey, model, tmp_path):
+    done = scenenet(
+        "predict", survey, "--model", model, "--out", tmp_path, "--min-wire", 0, "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    [summary] = json.loads(done.stdout)
+    assert summary["settings"]["detection"]["min_wire"] == 0
+
+
+def test_explain_writes_a_page_that_needs_no_other_file(survey, model, tmp_path):
+    page = tmp_path / "why.html"
+    done = scenenet("explain", survey, "--model", model, "--out", page, "--json")
+    assert done.returncode == 0, done.stderr
+    text = page.read_text()
+    assert "reach of the tower" in text
+    assert not re.search(r"""(src|href|url)\s*[=(]\s*["']?(https?:)?//""", text)
+    assert text.count("data:image/png") == len(json.loads(done.stdout))
+
+
+def test_a_missing_survey_ends_with_code_1_and_its_name(model, tmp_path):
+    done = scenenet("predict", tmp_path / "no.laz", "--model", model, "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert "no.laz" in done.stderr and "Traceback" not in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_check_goes_on_after_a_broken_survey_and_says_so(survey, tmp_path):
+    (tmp_path / "broken.laz").write_bytes(b"nothing")
+    done = scenenet("check", tmp_path / "broken.laz", survey)
+    assert done.returncode == 1
+    assert "broken.laz" in done.stderr and "corridor.laz" in done.stdout
+
+
+def test_a_model_that_is_none_is_refused(survey, tmp_path):
+    (tmp_path / "m.json").write_text("{}")
+    done = scenenet("predict", survey, "--model", tmp_path / "m.json", "--out", tmp_path / "out")
+    assert done.returncode == 1
+    assert "m.json" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_survey_is_never_overwritten_by_its_result(survey, model):
+    before = survey.read_bytes()
+    done = scenenet("predict", survey, "--model", model, "--out", survey.parent)
+    assert done.returncode == 1
+    assert survey.read_bytes() == before
+
+
+def test_wrong_calls_end_with_code_2(survey, tmp_path):
+    assert scenenet("evaluate", survey, "--codes", "edp").returncode == 2
+    assert (
+        scenenet("train", survey, "--codes", "guess", "--out", tmp_path / "m.json").returncode == 2
+    )
+    odd = scenenet("train", survey, "--codes", "edp", "--out", tmp_path / "m.json",
+                   "--resolution", 48)  # fmt: skip
+    assert odd.returncode == 2
+    cnn = scenenet("train", survey, "--codes", "edp", "--out", tmp_path / "m.json", "--kind", "cnn")
+    assert cnn.returncode == 2
+    assert ".safetensors" in cnn.stderr
+
+
+def test_a_survey_without_towers_is_not_trained_on(tmp_path):
+    from scenenet.pointcloud import PointCloud, write_las
+
+    xyz = np.random.default_rng(0).uniform(0, 30, (500, 3))
+    write_las(tmp_path / "field.laz", PointCloud(xyz, np.full(500, 2, np.uint8)))
+    done = scenenet("train", tmp_path / "field.laz", "--codes", "edp", "--out", tmp_path / "m.json")
+    assert done.returncode == 1
+    assert "field.laz" in done.stderr and "--codes" in done.stderr
+    assert not (tmp_path / "m.json").exists()
+
+
+def test_the_command_line_knows_every_class_scheme():
+    assert {codes.value for codes in Codes} == set(SCHEMES)
+
+
+def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path):
+    out = tmp_path / "out"
+    call = [sys.executable, "-c", "from scenenet.cli.app import main; main()", "predict", survey]
+    process = subprocess.Popen(
+        [*map(str, call), "--model", str(model), "--out", str(out)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+        # Under some runners Ctrl-C is ignored, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )
+    assert process.stderr is not None
+    said = process.stderr.readline()  # the survey has been read, the tiles come next
+    process.send_signal(signal.SIGINT)
+    said += process.communicate(timeout=60)[1]
+    assert process.returncode == 130
+    assert "interrupted" in said and "Traceback" not in said
+    assert [f.name for f in tmp_path.rglob("*") if f.is_file()] == []

@@ -1,0 +1,185 @@
+"""A configuration says what is wrong with it, and its schema is that of the models."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import jsonschema
+import pytest
+import yaml
+
+from scenenet.config import reference as config_reference
+from scenenet.config.schema import Config, load, merged
+from scenenet.core.errors import InputError
+from scenenet.core.files import read_json
+
+MODELS = [{"name": "scenenet", "kind": "scenenet"}, {"name": "cnn", "kind": "cnn"}]
+
+
+def raw(**settings):
+    return {"models": MODELS, "seeds": [0], **settings}
+
+
+def complaint(**settings) -> str:
+    with pytest.raises(InputError) as caught:
+        load(raw(**settings))
+    return str(caught.value)
+
+
+def shipped(root, name):
+    read = [yaml.safe_load((root / "config" / n).read_text()) for n in ("config.yaml", name)]
+    return merged(*read)
+
+
+@pytest.mark.parametrize("name", ["config.yaml", "test.yaml", "ts40k.yaml"])
+def test_the_shipped_configurations_are_valid(project_root, name):
+    config = load(shipped(project_root, name))
+    assert {model.kind for model in config.models} == {"scenenet", "cnn"}
+
+
+def test_the_shipped_configurations_write_to_different_folders_and_names(project_root):
+    configs = [load(shipped(project_root, n)) for n in ("config.yaml", "test.yaml", "ts40k.yaml")]
+    assert len({config.results_dir for config in configs}) == 3
+    assert len({config.dataset for config in configs}) == 3
+    # One store for all of them: with different settings, each would want it made anew.
+    assert len({config.tracking for config in configs}) == 1
+
+
+def test_the_default_protocol_is_that_of_the_thesis(project_root):
+    config = load(shipped(project_root, "config.yaml"))
+    assert (config.split.train, config.split.validation, config.split.test) == (0.2, 0.1, 0.7)
+    for name in ("scenenet", "cnn"):
+        model = config.model_named(name)
+        training, loss = model.training, model.training.loss
+        assert (training.optimiser, training.learning_rate) == ("rmsprop", 0.001)
+        assert (training.batch_size, training.epochs) == (8, 50)
+        assert (loss.alpha, loss.epsilon, loss.rho_shape, loss.rho_mixing) == (5, 0.1, 5, 5)
+        assert model.kernel_size == (9, 9, 9)
+    assert len(config.seeds) >= 5
+
+
+def test_all_settings_written_down_are_the_same_configuration(project_root):
+    config = load(shipped(project_root, "test.yaml"))
+    assert load(config.plain()) == config
+
+
+def test_common_training_settings_are_those_of_a_model_that_says_nothing_else():
+    own = {"name": "slow", "kind": "scenenet", "training": {"epochs": 200, "loss": {"alpha": 1}}}
+    config = load(
+        raw(
+            models=[*MODELS, own],
+            training={"epochs": 7, "learning_rate": 0.01, "loss": {"epsilon": 0.5}},
+        )
+    )
+    common, slow = config.model_named("cnn").training, config.model_named("slow").training
+    assert (common.epochs, common.learning_rate, common.loss.epsilon) == (7, 0.01, 0.5)
+    assert (slow.epochs, slow.learning_rate) == (200, 0.01)
+    assert (slow.loss.alpha, slow.loss.epsilon) == (1, 0.5)
+
+
+def test_a_typo_is_refused_with_the_line_as_it_should_be():
+    message = complaint(voxels={"resolutoin": 128})
+    assert "voxels.resolutoin: there is no such setting. Did you mean 'resolution'?" in message
+    assert message.endswith("      voxels:\n        resolution: 128")
+
+
+def test_a_key_like_no_other_is_refused_with_those_there_are():
+    message = complaint(zzz=1)
+    assert "zzz: there is no such setting" in message
+    assert "voxels" in message
+
+
+@pytest.mark.parametrize(
+    ("settings", "expected"),
+    [
+        ({"voxels": {"resolution": 63}}, "voxels.resolution: 63 is not allowed"),
+        ({"training": {"loss": {"alpha": -1}}}, "training.loss.alpha: -1 is not allowed"),
+        ({"split": {"train": 0.5}}, "split: train, validation and test must sum to 1"),
+        ({"towers": 3}, "towers: is 3, but groups the settings eps, min_points, cell"),
+        ({"seeds": [0, 0]}, "seeds: 0 is there more than once"),
+        ({"seeds": []}, "seeds: [] is not allowed"),
+        ({"predict": {"model": "best"}}, "'best' is not one of the models: scenenet, cnn"),
+        ({"models": [{"name": "a b", "kind": "cnn"}]}, "models[0].name: 'a b' is not allowed"),
+        ({"models": [{"name": "cnn"}]}, "models[0].kind: is missing"),
+        ({"synthetic": {"surveys": [{"towers": 3}]}}, "synthetic.surveys[0].name: is missing"),
+    ],
+)
+def test_a_wrong_value_is_named_with_its_key(settings, expected):
+    assert expected in complaint(**settings)
+
+
+def test_a_wrong_value_is_answered_with_the_default_and_the_unit():
+    message = complaint(detection={"eps": "near"})
+    assert "(m, " in message
+    assert message.endswith("      detection:\n        eps: 6.0")
+
+
+def test_all_mistakes_are_told_at_once():
+    message = complaint(towers={"epps": 1}, crops={"radius": 2}, seeds="none")
+    assert message.startswith("configuration: 3 settings are wrong\n")
+    for key in ("towers.epps", "crops.radius", "seeds"):
+        assert f"  {key}: " in message
+
+
+def test_a_mistake_in_the_common_training_settings_is_told_once():
+    assert complaint(training={"epoch": 3}).count("no such setting") == 1
+
+
+def test_a_mistake_in_one_model_is_told_of_that_model():
+    models = [MODELS[0], {"name": "cnn", "kind": "cnn", "training": {"epoch": 3}}]
+    message = complaint(models=models)
+    assert "models[1].training.epoch: there is no such setting" in message
+    assert "one setting is wrong" in message
+
+
+def test_mappings_are_merged_and_lists_replaced():
+    base = {"a": {"b": 1, "c": [1, 2]}, "d": 1}
+    assert merged(base, {"a": {"c": [3]}, "d": None}) == {"a": {"b": 1, "c": [3]}, "d": None}
+
+
+def test_reading_a_configuration_loads_nothing_heavy():
+    heavy = "torch numba mlflow sklearn matplotlib zarr laspy"
+    code = (
+        "import scenenet.config.schema, sys; "
+        f"print([m for m in '{heavy}'.split() if m in sys.modules])"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert shown.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("name", ["config.schema.json", "surveys.schema.json"])
+def test_the_schemas_are_those_of_the_models(project_root, name):
+    remedy = "run: python -m scenenet.config.reference --schema workflow/schemas"
+    written = read_json(project_root / "workflow" / "schemas" / name)
+    assert written == config_reference.schemas()[name], remedy
+
+
+def test_the_schema_takes_the_shipped_configuration_and_no_typo(project_root):
+    schema = config_reference.schemas()["config.schema.json"]
+    settings = shipped(project_root, "config.yaml")
+    jsonschema.validate(settings, schema)
+    with pytest.raises(jsonschema.ValidationError, match="resolutoin"):
+        jsonschema.validate({**settings, "voxels": {"resolutoin": 1}}, schema)
+
+
+def test_the_table_of_settings_is_that_of_the_models(project_root):
+    remedy = "run: python -m scenenet.config.reference --reference config/README.md"
+    written = (project_root / "config" / "README.md").read_text(encoding="utf-8")
+    assert written == config_reference.reference(), remedy
+
+
+def test_every_setting_says_what_it_is():
+    missing = [
+        f"{title}: {key}"
+        for title, model in config_reference.SECTIONS.items()
+        for key, field in config_reference.settings_of(model)
+        if not field.description
+    ]
+    assert missing == []
+
+
+def test_defaults_alone_are_no_configuration():
+    """What is trained has to be said; everything else has a default."""
+    required = [name for name, field in Config.model_fields.items() if field.is_required()]
+    assert required == ["models", "seeds"]

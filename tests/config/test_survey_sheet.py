@@ -1,0 +1,194 @@
+"""The survey sheet is checked as a whole before anything runs."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+
+from scenenet.config.schema import load
+from scenenet.config.survey_sheet import Survey, file_name, read_surveys
+from scenenet.core.errors import InputError
+from scenenet.pointcloud.class_schemes import SCHEMES, Codes
+
+HEADER = "survey\tpath\tcodes\trole"
+
+
+@pytest.fixture
+def root(tmp_path):
+    """A project with two surveys, a folder of samples and an inbox."""
+    for path in ("data/north.laz", "data/south.las", "ts40k/a.npy", "inbox/new one.laz"):
+        (tmp_path / path).parent.mkdir(exist_ok=True)
+        (tmp_path / path).write_bytes(path.encode())
+    return tmp_path
+
+
+def read(root, *rows: str, header: str = HEADER, **settings) -> list[Survey]:
+    sheet = root / "surveys.tsv"
+    sheet.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    raw = {
+        "models": [{"name": "scenenet", "kind": "scenenet"}],
+        "seeds": [0],
+        "surveys": "surveys.tsv",
+        "new_surveys": {"folder": None},
+        "synthetic": {"surveys": [{"name": "made"}]},
+    }
+    return read_surveys(load({**raw, **settings}), root)
+
+
+def complaint(root, *rows: str, **more) -> str:
+    with pytest.raises(InputError) as caught:
+        read(root, *rows, **more)
+    return str(caught.value)
+
+
+def test_a_row_is_a_survey(root):
+    assert read(root, "north\tdata/north.laz\tedp\ttrain") == [
+        Survey("north", "data/north.laz", "edp", "train", "file")
+    ]
+
+
+def test_columns_may_come_in_any_order_among_comments_and_empty_lines(root):
+    header = "# my surveys\nrole\tsurvey\tcodes\tpath"
+    rows = ["", "# the first", "new\tnorth\tasprs\tdata/north.laz"]
+    assert read(root, *rows, header=header)[0].role == "new"
+
+
+def test_a_sheet_saved_by_a_spreadsheet_is_read(root):
+    """It begins with a byte order mark and ends its lines with carriage returns."""
+    assert read(root, "north\tdata/north.laz\tedp\ttrain\r", header=f"﻿{HEADER}\r")
+
+
+def test_a_synthetic_survey_need_not_be_there_yet(root):
+    (survey,) = read(root, "corridor\t{results_dir}/synthetic/made.laz\tedp\ttrain")
+    assert survey == Survey("corridor", "results/synthetic/made.laz", "edp", "train", "synthetic")
+
+
+def test_the_place_of_a_synthetic_survey_follows_the_result_folder(root):
+    row = "corridor\t{results_dir}/synthetic/made.laz\tedp\ttrain"
+    assert read(root, row, results_dir="elsewhere")[0].path == "elsewhere/synthetic/made.laz"
+
+
+def test_an_absolute_path_is_taken_as_it_is(root):
+    path = str(root / "data" / "north.laz")
+    assert read(root, f"north\t{path}\tedp\ttrain")[0].path == path
+
+
+@pytest.mark.parametrize(
+    ("row", "expected"),
+    [
+        ("north\tdata/nort.laz\tedp\ttrain", "did you mean data/north.laz?"),
+        ("north\tdatta/north.laz\tedp\ttrain", "nor is its folder"),
+        ("north\tdata/north.laz\tepd\ttrain", "codes 'epd' is none of edp, asprs, ts40k, did"),
+        ("north\tdata/north.laz\tedp\ttraining", "role 'training' is none of train, new, did you"),
+        ("no rth/1\tdata/north.laz\tedp\ttrain", "such as 'no_rth_1'"),
+        ("\tdata/north.laz\tedp\ttrain", "survey is empty"),
+        ("north\tdata/north.laz\tedp", "role is empty"),
+        ("north\tdata/north.laz\tedp\ttrain\tnote", "5 columns, where the first line names 4"),
+        ("north\tdata\tedp\ttrain", "a folder without TS40K samples"),
+        ("north\tsurveys.tsv\tedp\ttrain", "surveys.tsv is none of .las, .laz, .npy, .pt"),
+        ("north\tts40k\tedp\tnew", "is a folder; samples in a folder can only be trained on"),
+        ("x\t{results_dir}/synthetic/mode.laz\tedp\ttrain", "{results_dir}/synthetic/made.laz?"),
+    ],
+)
+def test_a_row_that_is_wrong_is_named_by_its_line(root, row, expected):
+    message = complaint(root, "", row)
+    assert message.startswith("surveys.tsv: one problem in the survey sheet\n  line 3: ")
+    assert expected in message
+
+
+def test_all_problems_are_told_at_once(root):
+    message = complaint(
+        root,
+        "north\tdata/north.laz\tedp\ttrain",
+        "north\tdata/south.las\tedpp\ttrain",
+        "south\tdata/gone.laz\tedp\ttest",
+    )
+    assert message.splitlines()[0] == "surveys.tsv: 4 problems in the survey sheet"
+    assert "line 3: codes 'edpp'" in message
+    assert "line 3: the name 'north' is on line 2 already" in message
+    assert "line 4: role 'test'" in message
+    assert "line 4: data/gone.laz is not there" in message
+
+
+def test_every_scheme_of_class_codes_can_stand_in_the_sheet(root):
+    assert get_args(Codes) == tuple(SCHEMES)
+    assert read(root, "samples\tts40k\tts40k\ttrain")[0].codes == "ts40k"
+
+
+def test_a_file_cannot_be_trained_on_under_two_names(root):
+    """Its crops would be among those to train on and those to test on."""
+    rows = ["a\tdata/north.laz\tedp\ttrain", "b\tdata/../data/north.laz\tedp\ttrain"]
+    assert "line 3: the file" in complaint(root, *rows)
+    rows[1] = rows[1].replace("train", "new")
+    assert [survey.role for survey in read(root, *rows)] == ["train", "new"]
+
+
+def test_a_missing_column_is_told_with_what_may_be_meant(root):
+    message = complaint(root, header="survey\tpath\tcode\trole")
+    assert "column 'codes' is missing" in message
+    assert "column 'code' is not known, did you mean 'codes'?" in message
+
+
+def test_commas_instead_of_tabs_are_told(root):
+    message = complaint(root, header="survey,path,codes,role")
+    assert "line 1: the columns of the survey sheet must be separated by tabs" in message
+
+
+def test_an_empty_sheet_is_told_what_belongs_into_it(root):
+    assert "survey, path, codes, role" in complaint(root, header="# nothing")
+
+
+def test_a_sheet_that_is_not_there_is_named(root):
+    assert "gone.tsv: the survey sheet cannot be read" in complaint(root, surveys="gone.tsv")
+
+
+def test_every_survey_in_the_inbox_is_new(root):
+    inbox = {"folder": "inbox", "codes": "edp"}
+    assert read(root, new_surveys=inbox) == [
+        Survey("new_one", "inbox/new one.laz", "edp", "new", "file")
+    ]
+
+
+def test_the_inbox_passes_over_what_is_no_survey_and_what_is_still_copied(root):
+    for name in ("notes.txt", ".half.laz", "sub/deep.laz"):
+        (root / "inbox" / name).parent.mkdir(exist_ok=True)
+        (root / "inbox" / name).write_bytes(b"")
+    (root / "inbox" / "tile.copc.laz").write_bytes(b"")
+    names = [survey.name for survey in read(root, new_surveys={"folder": "inbox"})]
+    assert names == ["new_one", "tile"]
+
+
+def test_a_survey_of_the_sheet_is_not_taken_from_the_inbox_again(root):
+    row = "mine\tinbox/new one.laz\tedp\tnew"
+    assert [s.name for s in read(root, row, new_surveys={"folder": "inbox"})] == ["mine"]
+
+
+def test_an_inbox_that_is_not_there_is_empty(root):
+    assert read(root, new_surveys={"folder": "nowhere"}) == []
+
+
+def test_two_surveys_of_one_name_are_refused_wherever_they_come_from(root):
+    (root / "inbox" / "new_one.las").write_bytes(b"")
+    message = complaint(root, new_surveys={"folder": "inbox"})
+    assert "two surveys are called 'new_one': inbox/new one.laz and inbox/new_one.las" in message
+
+
+def test_a_folder_of_ts40k_samples_is_one_survey(root):
+    assert read(root, surveys=None, ts40k_dir="ts40k") == [
+        Survey("ts40k", "ts40k", "edp", "train", "ts40k")
+    ]
+
+
+@pytest.mark.parametrize("folder", ["data", "gone"])
+def test_a_folder_without_ts40k_samples_is_refused(root, folder):
+    message = complaint(root, surveys=None, ts40k_dir=folder)
+    assert f"{folder}: there are no TS40K samples" in message
+    assert "--config ts40k_dir=FOLDER" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"), [("a b/c", "a_b_c"), ("--x..", "x"), ("évora", "vora"), ("  ", "survey")]
+)
+def test_names_are_made_fit_for_files(text, expected):
+    assert file_name(text) == expected

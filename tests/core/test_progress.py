@@ -1,0 +1,23 @@
+"""Progress goes to stderr and leaves the items alone."""
+
+from __future__ import annotations
+
+from scenenet.core import progress
+from scenenet.core.progress import track
+
+
+def test_items_pass_through_and_a_log_gets_a_last_line(capsys):
+    assert list(track(iter("abc"), "letters")) == ["a", "b", "c"]
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err == "letters: done (3)\n"
+
+
+def test_a_log_is_told_how_far_it_is_now_and_then(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "LOG_INTERVAL_S", 0.0)
+    list(track([1, 2], "crops"))
+    assert capsys.readouterr().err.splitlines() == ["crops: 1/2", "crops: 2/2", "crops: done (2)"]
+
+
+def test_nothing_to_do_is_done():
+    assert list(track([], "crops")) == []

@@ -1,0 +1,106 @@
+"""The surroundings of each tower, cut out of a survey."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenenet.dataset import crops as crops_module
+from scenenet.dataset.crops import CropSettings, cut_crops, read_crops
+from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
+from scenenet.pointcloud import PointCloud, class_scheme, iter_chunks, write_las
+
+ORIGIN = np.array([500_000.0, 4_630_000.0, 0.0])
+PLACE = np.array([500_030.0, 4_630_020.0])
+
+
+def table(*towers: tuple[float, float, float]) -> pd.DataFrame:
+    """A table of towers at (x, y) from ``ORIGIN`` with a height."""
+    xy = np.array([t[:2] for t in towers]) + ORIGIN[:2]
+    heights = [t[2] for t in towers]
+    numbers = np.arange(1, len(towers) + 1)
+    return pd.DataFrame({"tower": numbers, "x": xy[:, 0], "y": xy[:, 1], "height": heights})
+
+
+@pytest.fixture
+def field(tmp_path):
+    """A survey of 60 x 40 m with a point a metre, and its cloud."""
+    x, y = np.meshgrid(np.arange(60.0), np.arange(40.0))
+    xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + ORIGIN
+    codes = np.random.default_rng(0).integers(0, 20, len(xyz)).astype(np.uint8)
+    cloud = PointCloud(xyz, codes, class_scheme("edp"))
+    write_las(tmp_path / "field.laz", cloud)
+    return tmp_path / "field.laz", cloud
+
+
+def cut(path, towers, folder, **settings):
+    facts = cut_crops(
+        "field",
+        path,
+        "edp",
+        towers,
+        CropSettings(**settings),
+        folder / "crops.zarr.zip",
+        folder / "manifest.json",
+    )
+    return facts, list(read_crops(folder / "manifest.json"))
+
+
+def test_a_crop_has_every_point_within_one_tower_height_and_no_other(field, tmp_path):
+    path, cloud = field
+    _, [(crop, cropped)] = cut(path, table((30, 20, 10.0)), tmp_path)
+    apart = np.linalg.norm(cloud.xyz[:, :2] - PLACE, axis=1)
+    expected = cloud.select(apart <= 10.0)
+    assert len(expected) == 317  # places of a square lattice within a circle of radius 10
+    np.testing.assert_allclose(cropped.xyz, expected.xyz, atol=1e-6)
+    np.testing.assert_array_equal(cropped.classification, expected.classification)
+    assert crop.id == "field-0001"
+    assert (crop.x, crop.y, crop.radius) == (500_030.0, 4_630_020.0, 10.0)
+
+
+def test_the_radius_is_given_in_tower_heights(field, tmp_path):
+    _, [(crop, cropped)] = cut(field[0], table((30, 20, 10.0)), tmp_path, radius_in_heights=0.5)
+    assert crop.radius == 5.0
+    assert len(cropped) == 81
+
+
+def test_crops_do_not_depend_on_the_chunks_a_survey_is_read_in(field, tmp_path, monkeypatch):
+    towers = table((10, 20, 8.0), (40, 10, 12.0))
+    (tmp_path / "small").mkdir()
+    whole, _ = cut(field[0], towers, tmp_path)
+    monkeypatch.setattr(
+        crops_module, "iter_chunks", lambda path, codes: iter_chunks(path, codes, 137)
+    )
+    pieces, _ = cut(field[0], towers, tmp_path / "small")
+    assert pieces == whole
+    manifests = [tmp_path / "manifest.json", tmp_path / "small" / "manifest.json"]
+    for (_, a), (_, b) in zip(*map(read_crops, manifests), strict=True):
+        np.testing.assert_array_equal(a.xyz, b.xyz)
+
+
+def test_a_crop_knows_all_towers_in_it(field, tmp_path):
+    _, crops = cut(field[0], table((20, 20, 15.0), (30, 20, 5.0), (50, 20, 5.0)), tmp_path)
+    assert [len(crop.towers) for crop, _ in crops] == [2, 1, 1]
+    np.testing.assert_array_equal(crops[0][0].towers, ORIGIN[:2] + np.array([[20, 20], [30, 20]]))
+
+
+def test_a_survey_without_towers_gives_an_empty_store(field, tmp_path):
+    towers = survey_towers(field[0], "edp", TowerSettings(min_points=100_000))
+    facts, crops = cut(field[0], towers, tmp_path)
+    assert facts["crops"] == crops == []
+
+
+def test_samples_are_taken_as_they_are(tmp_path, scene):
+    folder = tmp_path / "samples"
+    folder.mkdir()
+    clouds = {"sample_1": scene(seed=1), "sample_2": scene(seed=2), "sample_3": scene(poles=())}
+    for name, cloud in clouds.items():
+        np.save(folder / f"{name}.npy", np.column_stack([cloud.xyz, cloud.classification]))
+    towers = survey_towers(folder, "edp", TowerSettings(min_points=100))
+    facts, crops = cut(folder, towers, tmp_path)
+    assert [crop.id for crop, _ in crops] == ["field-sample_1", "field-sample_2"]
+    np.testing.assert_array_equal(crops[0][1].xyz, clouds["sample_1"].xyz)
+    np.testing.assert_array_equal(crops[0][1].classification, clouds["sample_1"].classification)
+    assert crops[0][0].radius == pytest.approx(14, abs=0.1)
+    assert facts["skipped"] == [{"sample": "sample_3.npy", "reason": "no tower found in it"}]

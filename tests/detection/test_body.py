@@ -1,0 +1,101 @@
+"""What stands on an axis, measured in voxels placed by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenenet.detection.body import middle, standing
+
+AXIS = np.array([0.5, 0.5])
+
+
+def stand(lattice, around, seen=(5.5, 14.5), at=AXIS, foot_radius=5.0):
+    elevations = np.asarray(seen) + lattice.place[2]
+    return standing(around, at + lattice.place[:2], elevations, foot_radius, 1.0)
+
+
+def lattice_tower(lattice, height: float, spread: float):
+    """Four legs that lean together from ``spread`` m off the axis to the top."""
+    z = np.arange(1, height)
+    off = spread * (1 - z / height)
+    corners = [
+        np.column_stack([0.5 + sx * off, 0.5 + sy * off, z]) for sx in (-1, 1) for sy in (-1, 1)
+    ]
+    return lattice.voxels(np.concatenate(corners))
+
+
+def test_a_pole_stands_on_the_ground_and_ends_at_its_top(lattice):
+    body = stand(lattice, lattice.together(lattice.ground(), lattice.column(0, 0, 0, 16)))
+    assert body.base == pytest.approx(lattice.place[2])
+    assert body.height == pytest.approx(16.0)  # the highest voxel, detected or not
+    assert body.upright == 1.0
+
+
+def test_one_return_from_below_the_ground_does_not_lower_the_foot(lattice):
+    below = lattice.voxels(np.array([[1.0, 1.0, -30.0]]))
+    body = stand(lattice, lattice.together(lattice.ground(), lattice.column(0, 0, 0, 16), below))
+    assert body.base == pytest.approx(lattice.place[2])
+
+
+def test_on_a_slope_the_foot_is_at_the_foot(lattice):
+    slope = lattice.ground(slope=1.0)
+    body = stand(lattice, lattice.together(slope, lattice.column(0, 0, 0, 16)))
+    assert body.base == pytest.approx(lattice.place[2], abs=5.0)  # and not 30 m down the hill
+
+
+def test_a_bird_above_a_tower_is_not_its_top(lattice):
+    bird = lattice.voxels(np.array([[0.5, 0.5, 25.0]]))
+    pole = lattice.column(0, 0, 0, 16)
+    assert stand(lattice, lattice.together(lattice.ground(), pole, bird)).height == pytest.approx(
+        16
+    )
+
+
+def test_a_stray_return_high_above_is_not_its_top(lattice):
+    pole = lattice.column(0, 0, 0, 16)
+    stray = lattice.voxels(np.array([[0.5, 0.5, 70.0]]))
+    around = lattice.together(lattice.ground(), pole, stray)
+    assert stand(lattice, around, seen=(5.5, 9.5, 14.5, 70.5)).height == pytest.approx(16)
+
+
+def test_wires_above_one_another_do_not_stand(lattice):
+    wires = [lattice.column(0, 0, z, z + 1) for z in (18, 24, 30)]
+    body = stand(lattice, lattice.together(lattice.ground(), *wires), seen=(18.5, 30.5))
+    assert body.upright < 0.2
+
+
+def test_the_legs_of_a_lattice_tower_count(lattice):
+    tower = lattice_tower(lattice, 40.0, 5.5)
+    body = stand(lattice, lattice.together(lattice.ground(), tower), seen=np.arange(10.5, 39, 4))
+    assert body.upright > 0.9
+
+
+def test_the_middle_of_a_lattice_tower_is_found_from_its_legs(lattice):
+    around = lattice.together(lattice.ground(), lattice_tower(lattice, 40.0, 4.0))
+    leg = np.array([3.0, 3.0]) + lattice.place[:2]
+    body = stand(lattice, around, seen=(10.5, 38.5))
+    axis, width, free = middle(around, leg, body, 1.0)
+    assert np.abs(axis - AXIS - lattice.place[:2]).max() < 0.6
+    assert 2 < width < 6
+    assert free > 0.5
+
+
+def test_wires_and_crossarms_do_not_widen_a_body(lattice):
+    pole = lattice.column(0, 0, 0, 16)
+    wires = [lattice.wires(b, 13.0) for b in (70, 250)]
+    around = lattice.together(lattice.ground(), pole, *wires)
+    axis, width, free = middle(around, AXIS + lattice.place[:2], stand(lattice, around), 1.0)
+    assert np.abs(axis - AXIS - lattice.place[:2]).max() < 0.1
+    assert width == pytest.approx(1.0)
+    assert 0.8 < free < 1  # not where the wires are
+
+
+def test_what_nowhere_stands_free_has_no_width(lattice):
+    x, y, z = (side.ravel() for side in np.meshgrid(*[np.arange(-9, 10)] * 2, np.arange(0, 16)))
+    block = lattice.voxels(np.column_stack([x, y, z]))
+    at = AXIS + lattice.place[:2]
+    axis, width, free = middle(block, at, stand(lattice, block), 1.0)
+    assert np.isnan(width)
+    assert free == 0
+    assert np.array_equal(axis, at)

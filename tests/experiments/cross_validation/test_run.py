@@ -1,0 +1,112 @@
+"""Every crop is scored once a seed by a model that has not seen it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenenet.dataset.crops import CropSettings, crop_of, cut_crops
+from scenenet.dataset.folds import folds
+from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
+from scenenet.dataset.voxel_cache import build, load
+from scenenet.dataset.voxels import VoxelSettings
+from scenenet.detection.settings import DetectionSettings
+from scenenet.experiments.cross_validation.run import (
+    COLUMNS,
+    WHOLE_TOWERS,
+    cross_validate,
+    run_folds,
+)
+from scenenet.experiments.cross_validation.summary import summarise_folds
+from scenenet.experiments.train_and_tune import train_and_tune
+from scenenet.synthetic import SyntheticSettings, make_survey
+
+DETECTION = DetectionSettings()
+GRID = VoxelSettings(resolution=32)
+
+
+@pytest.fixture(scope="module")
+def manifest(tmp_path_factory):
+    """Voxels of a synthetic line, as the workflow makes them."""
+    folder = tmp_path_factory.mktemp("crossed")
+    line = SyntheticSettings(towers=6, seed=4, density=12, tower_density=24)
+    make_survey(line, folder / "line.laz")
+    towers = survey_towers(folder / "line.laz", "edp", TowerSettings())
+    crops = folder / "crops.json"
+    cut_crops(
+        "line", folder / "line.laz", "edp", towers, CropSettings(), folder / "crops.zarr.zip", crops
+    )
+    build(crops, GRID, folder / "voxels.zarr.zip", folder / "voxels.json")
+    return folder / "voxels.json"
+
+
+def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
+    thesis = models[1]
+    both = cross_validate([manifest], thesis, (0, 1), 2, 0.0, DETECTION, tmp_path / "runs.csv")
+    assert tuple(pd.read_csv(tmp_path / "runs.csv").columns) == COLUMNS == tuple(both.columns)
+    of_towers = both["model"] == thesis.name + WHOLE_TOWERS
+    table, whole = both[~of_towers], both[of_towers]
+    dataset = load([manifest])
+    names = sorted(sample.id for sample in dataset.samples)
+    assert list(table["seed"]) == [0, 0, 0, 1, 1, 1]
+    assert list(table["crops"][:3]) == [" ".join(names[i : i + 2]) for i in (0, 2, 4)]
+    assert set(table["training_crops"]) == {4}
+    by_id = {sample.id: sample for sample in dataset.samples}
+    training, out = [by_id[n] for n in names[:2] + names[4:]], [by_id[n] for n in names[2:4]]
+    rival = train_and_tune(thesis, training, [], 1)
+    row = table[(table["seed"] == 1) & (table["fold"] == 2)].iloc[0]
+    counts = rival.score(out)
+    assert (row["tau"], row["f05"], row["tp"]) == (rival.tau, counts.f05, counts.tp)
+    assert row["tp"] + row["fn"] == sum(int(sample.tower.sum()) for sample in out)
+    row = whole[(whole["seed"] == 1) & (whole["fold"] == 2)].iloc[0]
+    counts = rival.score_towers(out, DETECTION)
+    assert (row["tau"], row["f05"], row["tp"]) == (rival.tau, counts.f05, counts.tp)
+
+
+def test_the_black_box_takes_part(manifest):
+    (row, *_) = run_folds(load([manifest]), None, (0,), 3, 0.0, DETECTION)
+    assert row["model"] == "black box"
+    assert row["training_crops"] == 3
+    assert 0 < row["tau"] < 1
+
+
+def runs() -> pd.DataFrame:
+    """Two seeds and two folds with counts that can be worked out by hand."""
+    rows = []
+    for seed, fold, tp, fp, fn, f05 in [(0, 1, 8, 2, 10, 0.6), (0, 2, 2, 0, 2, 0.8),
+                                        (1, 1, 6, 4, 12, 0.4), (1, 2, 0, 0, 4, 0.0)]:  # fmt: skip
+        row = dict.fromkeys(COLUMNS, 1.0) | {"model": "m", "seed": seed, "fold": fold, "f05": f05}
+        row |= {"crops": "a b" if fold == 1 else "c", "alive": tp > 0}
+        rows.append(row | {"tp": tp, "fp": fp, "fn": fn, "tn": 1000})
+    return pd.DataFrame(rows)
+
+
+def test_means_over_folds_their_spread_over_seeds_and_pooled_counts():
+    (row,) = summarise_folds(runs()).to_dict("records")
+    assert (row["n_seeds"], row["n_folds"], row["crops"], row["live_share"]) == (2, 2, 3, 0.75)
+    assert row["f05"] == pytest.approx(0.45)  # 0.7 and 0.2
+    assert row["f05_std"] == pytest.approx(np.std([0.7, 0.2], ddof=1))
+    # Seed 0: 10 of 12 detected and of 22 true; seed 1: 6 of 10 and of 22.
+    f05 = [1.25 * 10 / (1.25 * 10 + 0.25 * 12 + 2), 1.25 * 6 / (1.25 * 6 + 0.25 * 16 + 4)]
+    assert row["pooled_f05"] == pytest.approx(np.mean(f05))
+    assert row["pooled_precision"] == pytest.approx((10 / 12 + 0.6) / 2)
+    assert (row["worst_fold_f05"], row["best_fold_f05"]) == (0.4, 0.5)
+
+
+def test_one_seed_has_no_spread():
+    table = summarise_folds(runs()[lambda t: t["seed"] == 0])
+    assert pd.isna(table["f05_std"].iloc[0])
+
+
+def test_the_folds_of_the_real_crops_are_those_of_docs_accuracy(real_data, tmp_path):
+    folder = real_data / "ts40k"
+    towers = survey_towers(folder, "edp", TowerSettings())
+    facts = cut_crops(
+        "ts40k", folder, "edp", towers, CropSettings(), tmp_path / "c.zarr.zip", tmp_path / "c.json"
+    )
+    crops = [crop_of(entry) for entry in facts["crops"]]
+    made = folds(crops, 2, neighbour=100)
+    names = [[crops[i].id.removeprefix("ts40k-sample_") for i in fold.out] for fold in made]
+    assert names == [["575", "578"], ["584", "588"], ["591", "593"]]
+    assert all(len(fold.learnt) == 4 for fold in made)

@@ -1,0 +1,247 @@
+"""A study trains what it says, once, and scores it as a training by itself would be scored."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+import torch
+
+from scenenet.dataset.crops import CropSettings, cut_crops
+from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
+from scenenet.dataset.split import SplitSettings
+from scenenet.dataset.voxels import VoxelSettings
+from scenenet.experiments.published import Thesis
+from scenenet.experiments.studies import run
+from scenenet.experiments.studies.run import COLUMNS, run_study
+from scenenet.experiments.studies.settings import StudySettings
+from scenenet.experiments.studies.summary import summarise
+from scenenet.models.settings import ModelSettings, TrainingSettings
+from scenenet.synthetic import SyntheticSettings, make_survey
+
+MODEL = ModelSettings(
+    name="m", kind="scenenet", kernel_size=(5, 5, 5),
+    training=TrainingSettings(epochs=2, learning_rate=0.01, batch_size=2),
+)  # fmt: skip
+GRID = VoxelSettings(resolution=32)
+SPLIT = SplitSettings(train=0.4, validation=0.2, test=0.4, stretch=1, neighbour=30)
+
+
+def study(**fields) -> StudySettings:
+    told = {"name": "s", "title": "t", "place": "5", "asks": "?", "seeds": (0, 1)}
+    return StudySettings(**(told | fields))
+
+
+@pytest.fixture(scope="module")
+def crops(tmp_path_factory):
+    """Crops of a synthetic line of seven towers."""
+    folder = tmp_path_factory.mktemp("study")
+    settings = SyntheticSettings(towers=7, seed=4, density=12, tower_density=24)
+    make_survey(settings, folder / "line.laz")
+    towers = survey_towers(folder / "line.laz", "edp", TowerSettings())
+    manifest = folder / "manifest.json"
+    cut_crops("line", folder / "line.laz", "edp", towers, CropSettings(),
+              folder / "crops.zarr.zip", manifest)  # fmt: skip
+    return [manifest]
+
+
+def test_every_combination_is_a_variant():
+    both = study(vary={"training.loss.alpha": (0, 5), "kernel_size": ((9, 5, 5), (9, 9, 9))})
+    plans = both.plans(MODEL, GRID, SPLIT)
+    assert [plan.name for plan in plans] == [
+        "alpha 0, kernel_size 9x5x5", "alpha 0, kernel_size 9x9x9",
+        "alpha 5, kernel_size 9x5x5", "alpha 5, kernel_size 9x9x9",
+    ]  # fmt: skip
+    assert [plan.model.training.loss.alpha for plan in plans] == [0, 0, 5, 5]
+    assert plans[1].model.kernel_size == (9, 9, 9)
+    assert all(plan.model.training.epochs == 2 for plan in plans)
+
+
+def test_changes_go_where_they_belong_and_common_ones_to_all():
+    told = study(
+        common={"training.epochs": 7},
+        variants=[
+            {
+                "name": "a",
+                "changes": {"voxels.resolution": 64, "split.train": 0.2, "split.test": 0.6},
+            },
+            {"name": "b", "changes": {"applied.kernel_size": [9, 3, 3], "applied.resolution": 128}},
+        ],
+    )
+    a, b = told.plans(MODEL, GRID, SPLIT)
+    assert (a.model.training.epochs, b.model.training.epochs) == (7, 7)
+    assert (a.voxels.resolution, a.applied_voxels.resolution, a.split.train) == (64, 64, 0.2)
+    assert (b.voxels.resolution, b.applied_voxels.resolution) == (32, 128)
+    assert (a.applied_size, b.applied_size) == (None, (9, 3, 3))
+
+
+@pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"training.los.alpha": 1}, "los"),
+        ({"training.epochs": 0}, "epochs"),
+        ({"split.train": 0.9}, "sum to 1"),
+        ({"applied.tau": 0.5}, "applied.tau"),
+        ({"voxels.resolution": 48}, "resolution"),
+        ({"kind": "cnn", "training.init": "unranged"}, "a CNN has no ranges"),
+    ],
+)
+def test_a_change_that_cannot_be_is_named(changes, named):
+    with pytest.raises(ValueError, match=named):
+        study(variants=[{"name": "wrong", "changes": changes}]).plans(MODEL, GRID, SPLIT)
+
+
+def test_a_reference_may_stand_before_the_combinations():
+    told = study(
+        variants=[{"name": "none"}],
+        vary={"training.decay": (0.05, 0.25), "training.decay_every": (10, 20)},
+    )
+    plans = told.plans(MODEL, GRID, SPLIT)
+    assert [plan.name for plan in plans] == [
+        "none", "decay 0.05, decay_every 10", "decay 0.05, decay_every 20",
+        "decay 0.25, decay_every 10", "decay 0.25, decay_every 20",
+    ]  # fmt: skip
+    assert [plan.model.training.decay for plan in plans] == [0.0, 0.05, 0.05, 0.25, 0.25]
+    assert not told.is_grid
+    assert study(vary=told.vary).is_grid
+
+
+def test_small_numbers_are_written_out():
+    told = study(vary={"training.loss.epsilon": (0.00001, 0.1), "training.loss.alpha": (5, 0.001)})
+    names = [variant.name for variant in told.all_variants()]
+    assert names[:2] == ["epsilon 0.00001, alpha 5", "epsilon 0.00001, alpha 0.001"]
+
+
+def test_another_architecture_or_protocol_is_a_change_as_any_other():
+    told = study(
+        variants=[
+            {"name": "cnn", "changes": {"kind": "cnn", "training.init": "field"}},
+            {"name": "metres", "changes": {"protocol": "field", "search.searches": 1}},
+        ]
+    )
+    cnn, metres = (plan.model for plan in told.plans(MODEL, GRID, SPLIT))
+    assert (cnn.kind, cnn.training.init, cnn.training.epochs) == ("cnn", "field", 2)
+    assert (metres.kind, metres.protocol, metres.search.searches) == ("scenenet", "field", 1)
+
+
+def test_without_variants_there_is_nothing_to_do():
+    with pytest.raises(ValueError, match="give variants, or vary, or both"):
+        study()
+    with pytest.raises(ValueError, match="more than once"):
+        study(variants=[{"name": "a"}, {"name": "a"}])
+
+
+def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
+    trained = []
+    original = run.fit
+    monkeypatch.setattr(run, "fit", lambda *a: trained.append(a) or original(*a))
+    told = study(
+        variants=[
+            {"name": "as trained"},
+            {"name": "smaller", "changes": {"applied.kernel_size": [5, 3, 3]}},
+            {"name": "cylinder", "changes": {"geneos": ["cylinder"]}},
+        ]
+    )
+    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    assert len(table) == 6
+    assert len(trained) == 4  # the smaller kernels are sampled from the same trainings
+    assert list(table["parameters"]) == [11, 11, 11, 11, 2, 2]
+    read = pd.read_csv(tmp_path / "runs.csv")
+    assert tuple(read.columns) == COLUMNS
+    scores = table.set_index(["variant", "seed"])[["precision", "recall", "f05", "tau", "loss"]]
+    again = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "again.csv")
+    pd.testing.assert_frame_equal(
+        scores, again.set_index(["variant", "seed"])[list(scores)], check_exact=True
+    )
+    assert scores.loc[("as trained", 0), "loss"] == scores.loc[("smaller", 0), "loss"]
+    assert scores["f05"].nunique() > 1
+
+
+def test_models_of_other_kinds_are_trained_and_scored_beside(crops, tmp_path):
+    told = study(
+        seeds=(0,),
+        variants=[
+            {"name": "ranges"},
+            {"name": "none", "changes": {"training.init": "unranged"}},
+            {"name": "cnn", "changes": {"kind": "cnn"}},
+            {
+                "name": "metres",
+                "changes": {
+                    "protocol": "field", "search.searches": 1, "search.trial": 1,
+                    "search.starts": 8, "search.generations": 1, "search.population": 4,
+                },
+            },
+        ],
+    )  # fmt: skip
+    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    rows = {row["variant"]: row for row in table.to_dict("records")}
+    assert {name: row["kind"] for name, row in rows.items()} == {
+        "ranges": "scenenet", "none": "scenenet", "cnn": "cnn", "metres": "scenenet",
+    }  # fmt: skip
+    assert rows["cnn"]["parameters"] == 3 * (5 * 5 * 5 + 1)
+    assert pd.isna(rows["cnn"]["lowest_weight"])
+    assert pd.isna(rows["cnn"]["lowest_shape"])
+    # Two steps of 0.01 leave numbers from positive ranges positive, and those of N(0, 1) mixed.
+    assert rows["ranges"]["lowest_shape"] > 0
+    drawn = torch.randn(11, generator=torch.Generator().manual_seed(0))
+    assert rows["none"]["lowest_shape"] == pytest.approx(drawn[:9].min().item(), abs=0.3)
+    # In metres numbers are positive by construction.
+    assert min(rows["metres"]["lowest_weight"], rows["metres"]["lowest_shape"]) > 0
+
+
+def test_a_training_that_loses_its_way_is_a_dead_one_and_the_others_go_on(crops, tmp_path):
+    lost = {"training.learning_rate": 1e30, "training.optimiser": "sgd", "training.epochs": 4}
+    told = study(variants=[{"name": "lost", "changes": lost}, {"name": "kept"}])
+    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    gone = table[table["variant"] == "lost"]
+    assert len(table) == 4
+    assert gone["loss"].isna().all()
+    assert not gone["alive"].any()
+    assert (gone[["precision", "recall", "f05"]] == 0).all(axis=None)
+    assert gone["miou"].between(0.49, 0.5).all()
+    assert (gone["parameters"] == 11).all()
+    assert table.loc[table["variant"] == "kept", "loss"].notna().all()
+    lost_row, _ = summarise(told, table, Thesis(source="s", numbers={})).to_dict("records")
+    assert (lost_row["alive"], lost_row["f05"]) == (0, 0.0)
+
+
+def test_the_summary_is_over_seeds_with_the_thesis_beside():
+    told = study(variants=[{"name": "a", "thesis": "ablation.a"}, {"name": "b"}])
+    runs = pd.DataFrame(
+        [
+            {"variant": v, "seed": s, "alive": f > 0, "f05": f}
+            for v, s, f in [("a", 0, 0.2), ("a", 1, 0.4), ("b", 0, 0.0), ("b", 1, 0.3)]
+        ]
+    )
+    for name in set(COLUMNS) - set(runs):
+        runs[name] = 1.0
+    number = {"value": 0.5, "place": "Table 5.5"}
+    thesis = Thesis(source="s", numbers={"ablation.a.precision": number})
+    a, b = summarise(told, runs, thesis).to_dict("records")
+    assert a["f05"] == pytest.approx(0.3)
+    assert a["f05_std"] == pytest.approx(0.141421, abs=1e-6)
+    assert (a["live_share"], b["live_share"]) == (1.0, 0.5)
+    assert (a["alive"], b["alive"]) == (2, 1)
+    assert a["thesis_precision"] == 0.5
+    assert pd.isna(b["thesis_precision"])
+
+
+def test_negative_numbers_are_counted_by_seed():
+    told = study(variants=[{"name": name} for name in ("a", "b", "cnn")], seeds=(0, 1, 2, 3))
+    lowest = {
+        "a": ([0.1, -0.1, 0.2, 0.3], [0.5, 0.5, 0.5, -0.2]),  # by weight, by shape
+        "b": ([0.1, 0.1, 0.2, 0.3], [0.5, 0.4, 0.0, 0.2]),
+        "cnn": ([float("nan")] * 4, [float("nan")] * 4),
+    }
+    runs = pd.DataFrame(
+        [
+            dict.fromkeys(COLUMNS, 0.5)
+            | {"variant": v, "seed": s, "alive": True}
+            | {"lowest_weight": weights[s], "lowest_shape": shapes[s]}
+            for v, (weights, shapes) in lowest.items()
+            for s in range(4)
+        ]
+    )
+    a, b, cnn = summarise(told, runs, Thesis(source="s", numbers={})).to_dict("records")
+    assert (a["negative_share"], b["negative_share"]) == (0.5, 0.0)
+    assert (a["lowest_weight"], a["lowest_shape"]) == (-0.1, -0.2)
+    assert pd.isna(cnn["negative_share"])

@@ -1,0 +1,55 @@
+"""A crop for the page holds what its evaluation says of it."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scenenet.figures.interactive_crop import CLASSES, write_scene
+from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
+from scenenet.results.folder import Results
+
+
+def decoded(text: str, kind: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), kind)
+
+
+@pytest.fixture
+def scene(results: Results, tmp_path: Path) -> dict:
+    write_scene(results, "scenenet", "median", tmp_path / "median.json")
+    return json.loads((tmp_path / "median.json").read_text())
+
+
+def test_every_voxel_has_a_place_a_class_and_a_part_of_each_operator(scene):
+    tower = decoded(scene["tower"], "<u1")
+    classes = decoded(scene["class"], "<u1")
+    assert len(decoded(scene["zyx"], "<i2")) == 3 * len(tower)
+    # A voxel that holds a tower point shows the tower, whatever else is in it.
+    assert set(classes[tower > 0]) == {CLASSES.index("tower")}
+    assert {CLASSES[code] for code in set(classes)} == {"ground", "wire", "tower"}
+    assert list(scene["shares"]) == ["cylinder", "arrow", "negative_sphere"]
+    shares = np.array([decoded(text, "<i1") for text in scene["shares"].values()], int)
+    assert np.abs(np.abs(shares).sum(axis=0) - 100).max() <= 2
+
+
+def test_the_counts_are_those_of_the_whole_grid(scene):
+    curve = ThresholdCurve(np.array(scene["true"]), np.array(scene["false"]))
+    assert curve.true.sum() == decoded(scene["tower"], "<u1").sum()
+    assert curve.true.sum() + curve.false.sum() == 32**3
+    # The occupied voxels alone reach no threshold more often than all voxels do.
+    steps, tower = decoded(scene["steps"], "<u2"), decoded(scene["tower"], "<u1") > 0
+    np.testing.assert_array_equal(np.bincount(steps[tower], minlength=651), curve.true)
+    assert (np.bincount(steps[~tower], minlength=651)[1:] <= curve.false[1:]).all()
+    assert len(scene["taus"]) == len(THRESHOLDS)
+
+
+def test_whole_towers_score_what_their_voxels_say(scene):
+    tower, whole = (decoded(scene[name], "<u1") > 0 for name in ("tower", "whole"))
+    tp, fp = (whole & tower).sum(), (whole & ~tower).sum()
+    assert whole.any()
+    assert scene["whole_scores"]["precision"] == pytest.approx(tp / (tp + fp))
+    assert scene["whole_scores"]["recall"] == pytest.approx(tp / tower.sum())

@@ -1,0 +1,368 @@
+"""A whole survey: every point comes back with its answer, and the towers are listed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pyproj
+import pytest
+import torch
+
+from scenenet.core.errors import InputError
+from scenenet.detection.settings import DetectionSettings
+from scenenet.models.cnn import CNN
+from scenenet.models.factory import new_model
+from scenenet.models.model_file import ModelCard, read_model, write_model
+from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
+from scenenet.pointcloud import PointCloud, read, write_las
+from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.settings import PredictSettings
+from scenenet.training.train import fit
+from scenenet.training.tuning import choose
+
+POLE = (500_020.5, 4_630_031.5)
+DUTCH_TOWER_HEIGHT_M = 42.0
+LONE_POLES = DetectionSettings(min_wire=0)
+"""For scenes of poles without wires."""
+ADDED = {
+    "tower_probability": np.float32,
+    "tower_id": np.uint32,
+    "share_cylinder": np.float32,
+    "share_arrow": np.float32,
+    "share_negative_sphere": np.float32,
+}
+SHARES = [name for name in ADDED if name.startswith("share_")]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """What predict_survey wrote and returned."""
+
+    laz: Path
+    towers: dict[str, Any]
+    summary: dict[str, Any]
+
+    @property
+    def points(self) -> laspy.LasData:
+        return laspy.read(self.laz)
+
+
+def predict(
+    survey: Path,
+    model: Path,
+    folder: Path,
+    detection: DetectionSettings = LONE_POLES,
+    **settings,
+) -> Prediction:
+    folder.mkdir(exist_ok=True)
+    laz, geojson, summary = (folder / n for n in ("out.laz", "towers.geojson", "summary.json"))
+    returned = predict_survey(
+        survey, model, laz, geojson, summary, PredictSettings(**settings), detection
+    )
+    assert json.loads(summary.read_text()) == returned
+    return Prediction(laz, json.loads(geojson.read_text()), returned)
+
+
+def equal_field_by_field(before: laspy.LasData, after: laspy.LasData) -> None:
+    """Every dimension of ``before`` is in ``after``: the same stored numbers in the same order."""
+    np.testing.assert_array_equal(after.header.scales, before.header.scales)
+    np.testing.assert_array_equal(after.header.offsets, before.header.offsets)
+    assert after.header.point_count == before.header.point_count
+    assert after.header.point_format.id == before.header.point_format.id
+    raw_before, raw_after = before.points.array, after.points.array
+    assert set(raw_before.dtype.names) <= set(raw_after.dtype.names)
+    for name in raw_before.dtype.names:  # X, Y and Z are the stored integers
+        np.testing.assert_array_equal(raw_after[name], raw_before[name], err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def model(pole_finder, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("model") / "by-hand.json"
+    write_model(path, *pole_finder)
+    return path
+
+
+@pytest.fixture(scope="module")
+def survey(scene, tmp_path_factory) -> Path:
+    """A pole and a tree on 70 x 60 m of flat ground, with a CRS and a dimension of its own."""
+    cloud = scene([(20.5, 31.5)], size=(70.0, 60.0), tree=(45.0, 40.0))
+    order = np.random.default_rng(0).permutation(len(cloud))
+    cloud = PointCloud(cloud.xyz[order], cloud.classification[order], crs=pyproj.CRS(32629))
+    path = tmp_path_factory.mktemp("survey") / "field.laz"
+    write_las(path, cloud, extra={"reflectance": np.arange(len(cloud), dtype=np.float32)})
+    return path
+
+
+@pytest.fixture(scope="module")
+def predicted(survey, model, tmp_path_factory) -> Prediction:
+    return predict(survey, model, tmp_path_factory.mktemp("predicted"))
+
+
+def test_every_point_comes_back_with_all_it_had(survey, predicted):
+    equal_field_by_field(laspy.read(survey), predicted.points)
+    assert predicted.points.header.parse_crs() == laspy.read(survey).header.parse_crs()
+
+
+def test_the_answers_are_added_and_nothing_else(survey, predicted):
+    before, after = laspy.read(survey).point_format, predicted.points.point_format
+    added = set(after.dimension_names) - set(before.dimension_names)
+    assert added == set(ADDED)
+    for name, dtype in ADDED.items():
+        assert predicted.points[name].dtype == dtype
+
+
+def test_the_tower_is_listed_where_it_stands(predicted):
+    [tower] = predicted.towers["features"]
+    assert tower["geometry"]["type"] == "Point"
+    assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.5)
+    told = tower["properties"]
+    assert told["id"] == 1
+    assert told["height"] == pytest.approx(14.0, abs=1.0)
+    assert told["base_elevation"] == pytest.approx(100.0, abs=1.0)
+    assert 0.7 <= told["probability"] <= 1.0
+    assert told["edge_distance"] == pytest.approx(20.5, abs=2.0)
+    assert set(told["contributions"]) == {"cylinder", "arrow", "negative_sphere"}
+    assert sum(map(abs, told["contributions"].values())) == pytest.approx(1.0, abs=0.05)
+    crs = predicted.towers["crs"]["properties"]["name"]
+    assert crs == "urn:ogc:def:crs:EPSG::32629"
+
+
+def test_wires_are_listed_with_their_tower_and_a_lone_pole_is_none(scene, model, tmp_path):
+    cloud = scene([(20.5, 31.5), (60.5, 31.5)], size=(81.0, 60.0), tree=None)
+    s = np.arange(-28, 28, 0.2)
+    x, y = POLE
+    wire = np.column_stack([np.full(len(s), x), y + s, 113.8 - s**2 / 1000])
+    line = PointCloud(
+        np.concatenate([cloud.xyz, wire]),
+        np.append(cloud.classification, np.full(len(wire), 16, np.uint8)),
+    )
+    write_las(tmp_path / "line.laz", line)
+    found = predict(tmp_path / "line.laz", model, tmp_path / "out", DetectionSettings())
+    [tower] = found.towers["features"]
+    assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.6)
+    told = tower["properties"]
+    assert told["wire_directions"] == 2
+    assert sorted(round(b) % 360 for b in told["wire_bearings"]) == [0, 180]
+    assert 1.0 <= told["width"] <= 2.0
+    assert set(np.unique(found.points["tower_id"])) == {0, 1}
+
+
+def test_the_points_of_the_tower_carry_its_number(predicted):
+    points = predicted.points
+    of_tower = points["tower_id"] == 1
+    assert set(np.unique(points["tower_id"])) == {0, 1}
+    assert of_tower.sum() == predicted.towers["features"][0]["properties"]["points"] > 100
+    away = np.hypot(points.x[of_tower] - POLE[0], points.y[of_tower] - POLE[1])
+    assert away.max() < LONE_POLES.body + 1.0
+    # Detected or not: a model answers little at the foot of a pole.
+    above_foot = np.asarray(points.z) > 100 + LONE_POLES.foot + 1.0
+    pole = (np.asarray(points.classification) == 15) & above_foot
+    assert of_tower[pole].all()
+    assert (points["tower_probability"][pole] < LONE_POLES.threshold(0.7)).any()
+
+
+def test_shares_sum_to_one_where_anything_answers(predicted):
+    points = predicted.points
+    shares = np.stack([points[name] for name in SHARES])
+    total = np.abs(shares).sum(axis=0)
+    assert np.all(np.isclose(total, 1, atol=1e-5) | (total == 0))
+    assert np.isclose(total, 1, atol=1e-5).mean() > 0.9
+    # What is called a tower is so because more speaks for it than against it.
+    sure = points["tower_probability"] > 0
+    assert (shares[:, sure].sum(axis=0) > 0).all()
+    assert sure.any()
+
+
+def test_points_of_one_voxel_have_one_answer(predicted):
+    points = predicted.points
+    voxels = np.floor(np.column_stack([points.x, points.y, points.z])).astype(int)
+    _, voxel = np.unique(voxels, axis=0, return_inverse=True)
+    for name in ADDED:
+        values = np.asarray(points[name], float)
+        n = np.bincount(voxel)
+        spread = np.bincount(voxel, values**2) / n - (np.bincount(voxel, values) / n) ** 2
+        assert np.abs(spread).max() < 1e-6
+
+
+def test_the_summary_says_what_was_done(predicted, survey):
+    summary = predicted.summary
+    assert summary["survey"] == str(survey)
+    assert summary["points"] == len(laspy.read(survey).points)
+    assert summary["towers"] == 1
+    assert summary["tau"] == 0.7
+    assert summary["voxel_size_m"] == 1.0
+    assert summary["kernel_size"] == [9, 9, 9]
+    assert summary["settings"]["detection"] == LONE_POLES.model_dump()
+
+
+@pytest.mark.parametrize("chunk_points", [997, 10**9])
+def test_chunks_do_not_matter(survey, model, predicted, tmp_path, chunk_points):
+    again = predict(survey, model, tmp_path, chunk_points=chunk_points)
+    assert again.towers == predicted.towers
+    assert np.array_equal(again.points.points.array, predicted.points.points.array)
+
+
+def test_order_of_points_does_not_matter(survey, model, predicted, tmp_path):
+    cloud = read(survey)
+    order = np.random.default_rng(1).permutation(len(cloud))
+    write_las(tmp_path / "mixed.laz", cloud.select(order))
+    mixed = predict(tmp_path / "mixed.laz", model, tmp_path / "out")
+    assert mixed.towers == predicted.towers
+    for name in ADDED:
+        np.testing.assert_array_equal(mixed.points[name], predicted.points[name][order])
+
+
+def test_a_predicted_survey_can_be_predicted_again(predicted, model, tmp_path):
+    again = predict(predicted.laz, model, tmp_path)
+    assert again.towers == predicted.towers
+    assert np.array_equal(again.points.points.array, predicted.points.points.array)
+
+
+def test_the_voxel_size_can_be_set(survey, model, tmp_path):
+    assert predict(survey, model, tmp_path, voxel_size=2.0).summary["voxel_size_m"] == 2.0
+
+
+def test_a_model_in_metres_sees_fine_voxels_in_blocks(survey, model, tmp_path):
+    _, card = read_model(model)
+    settings = ModelSettings(name="metric", kind="scenenet", protocol="field")
+    write_model(tmp_path / "metric.json", new_model(settings, 0), card)
+    fine = predict(survey, tmp_path / "metric.json", tmp_path, voxel_size=0.3)
+    assert fine.summary["voxel_size_m"] == pytest.approx(0.9)
+    assert predict(survey, model, tmp_path, voxel_size=0.5).summary["voxel_size_m"] == 0.5
+
+
+def test_towers_are_numbered_in_the_list_and_in_the_points(scene, model, tmp_path):
+    cloud = scene([(15.5, 15.5), (75.5, 15.5), (135.5, 15.5)], size=(151.0, 31.0), tree=None)
+    write_las(tmp_path / "line.laz", cloud)
+    line = predict(tmp_path / "line.laz", model, tmp_path / "out")
+    places = {f["id"]: f["geometry"]["coordinates"] for f in line.towers["features"]}
+    assert sorted(places) == [1, 2, 3]
+    assert sorted(round(x - 500_000.5) for x, _ in places.values()) == [15, 75, 135]
+    for number, (x, y) in places.items():
+        mine = line.points["tower_id"] == number
+        assert np.hypot(line.points.x[mine] - x, line.points.y[mine] - y).max() < 2
+    assert "crs" not in line.towers  # the survey names none, and none is made up
+
+
+def test_a_survey_without_points_gives_an_empty_list(model, tmp_path):
+    nothing = PointCloud(np.empty((0, 3)), np.empty(0, np.uint8), crs=pyproj.CRS(32629))
+    write_las(tmp_path / "empty.laz", nothing)
+    empty = predict(tmp_path / "empty.laz", model, tmp_path / "out")
+    assert empty.towers["features"] == []
+    assert empty.towers["crs"]["properties"]["name"] == "urn:ogc:def:crs:EPSG::32629"
+    assert empty.summary["points"] == 0
+    assert len(empty.points) == 0
+    assert set(ADDED) <= set(empty.points.point_format.dimension_names)
+
+
+@pytest.mark.parametrize("n", [0, 1])
+def test_a_sample_of_hardly_any_points_is_a_survey(model, tmp_path, n):
+    np.save(tmp_path / "tiny.npy", np.full((n, 4), 2.0))
+    tiny = predict(tmp_path / "tiny.npy", model, tmp_path / "out")
+    assert len(tiny.points) == n
+    assert tiny.towers["features"] == []
+
+
+def test_a_sample_comes_back_as_laz(scene, model, tmp_path):
+    cloud = scene()
+    np.save(tmp_path / "sample.npy", np.column_stack([cloud.xyz, cloud.classification]))
+    sample = predict(tmp_path / "sample.npy", model, tmp_path / "out")
+    points = sample.points
+    xyz = np.column_stack([points.x, points.y, points.z])
+    np.testing.assert_allclose(xyz, cloud.xyz, atol=0.0005001)
+    np.testing.assert_array_equal(points.classification, cloud.classification)
+    assert len(sample.towers["features"]) == 1
+    assert (points["tower_id"] == 1).any()
+
+
+def test_a_stray_point_far_out_is_named_and_nothing_is_written(scene, model, tmp_path):
+    cloud = scene()
+    xyz = np.concatenate([cloud.xyz, [[5e8, 0, 0]]])
+    np.save(tmp_path / "stray.npy", np.column_stack([xyz, np.full(len(xyz), 2.0)]))
+    with pytest.raises(InputError, match="too far out"):
+        predict(tmp_path / "stray.npy", model, tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_an_untuned_model_is_refused_before_anything_is_read(pole_finder, tmp_path):
+    untuned, card = pole_finder
+    write_model(tmp_path / "m.json", untuned, card.model_copy(update={"tau": None}))
+    with pytest.raises(InputError, match="no detection threshold"):
+        predict(tmp_path / "not-there.laz", tmp_path / "m.json", tmp_path / "out")
+
+
+def test_a_cnn_gives_probabilities_and_no_shares(survey, pole_finder, tmp_path):
+    _, card = pole_finder
+    cnn = CNN(2, (5, 5, 5), generator=torch.Generator().manual_seed(0))
+    write_model(tmp_path / "cnn.safetensors", cnn, card.with_tau(0.1))
+    found = predict(survey, tmp_path / "cnn.safetensors", tmp_path / "out")
+    names = set(found.points.point_format.dimension_names)
+    assert {"tower_probability", "tower_id"} <= names
+    assert not any(name.startswith("share_") for name in names)
+    assert (found.points["tower_probability"] > 0).any()
+    assert all(f["properties"]["contributions"] == {} for f in found.towers["features"])
+
+
+@pytest.fixture(scope="module")
+def real_model(real_samples, tmp_path_factory) -> Path:
+    """A SCENE-Net trained on the real crops: tau and kernel size tuned on the same few."""
+    samples = list(real_samples.values())
+    settings = ModelSettings(
+        name="real",
+        kind="scenenet",
+        kernel_size=(15, 5, 5),
+        training=TrainingSettings(epochs=60, learning_rate=0.02),
+    )
+    trained, _ = fit(samples, [], settings, seed=1)
+    voxel_size = float(np.median([s.grid.voxel_size for s in samples]))
+    card = ModelCard(
+        name="real", codes="edp", measurement="presence", fit="cube", resolution=64,
+        voxel_size=voxel_size,
+    )  # fmt: skip
+    tuned, card, _ = choose(trained, card, samples, TuningSettings(kernel_sizes=((9, 5, 5),)))
+    path = tmp_path_factory.mktemp("real") / "real.json"
+    write_model(path, tuned, card)
+    return path
+
+
+@pytest.fixture(scope="module")
+def real_prediction(real_data, real_model, tmp_path_factory) -> Prediction:
+    survey = real_data / "corridor" / "07CZ2_14.laz"
+    return predict(survey, real_model, tmp_path_factory.mktemp("corridor"))
+
+
+def test_a_model_of_portuguese_poles_finds_the_dutch_tower(real_prediction, real_data):
+    survey = read(real_data / "corridor" / "07CZ2_14.laz", "asprs")
+    labelled = survey.xyz[survey.is_tower]
+    true = (labelled[:, :2].min(axis=0) + labelled[:, :2].max(axis=0)) / 2
+    features = real_prediction.towers["features"]
+    apart = [np.hypot(*(np.array(f["geometry"]["coordinates"]) - true)) for f in features]
+    nearest = features[int(np.argmin(apart))]
+    assert min(apart) < 5.0
+    assert nearest["properties"]["height"] == pytest.approx(DUTCH_TOWER_HEIGHT_M, abs=4.0)
+    points = real_prediction.points
+    mine = points["tower_id"] == nearest["id"]
+    assert np.mean(np.asarray(points.classification)[mine] == 15) > 0.5
+
+
+def test_a_real_survey_comes_back_field_by_field(real_prediction, real_data):
+    before = laspy.read(real_data / "corridor" / "07CZ2_14.laz")
+    equal_field_by_field(before, real_prediction.points)
+    added = set(real_prediction.points.point_format.dimension_names)
+    assert added - set(before.point_format.dimension_names) == set(ADDED)
+
+
+@pytest.mark.parametrize(("epsg", "said"), [(4326, "degrees"), (2229, "0.304801 m")])
+def test_a_survey_that_is_not_in_metres_is_refused(tmp_path, model, epsg, said):
+    """Sizes of voxels and towers are lengths."""
+    xyz = np.random.default_rng(0).uniform(0, 80, (50, 3))
+    crs = pyproj.CRS.from_epsg(epsg)
+    write_las(tmp_path / "far.laz", PointCloud(xyz, np.ones(50, np.uint8), crs=crs))
+    with pytest.raises(InputError, match=rf"far\.laz.*{said}.*Reproject"):
+        predict(tmp_path / "far.laz", model, tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []

@@ -1,0 +1,120 @@
+"""A contest in tables, figure, MLflow and page."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pandas as pd
+import pytest
+
+from scenenet.experiments.cross_validation import run as cross_validation
+from scenenet.experiments.label_noise.run import COLUMNS
+from scenenet.experiments.label_noise.settings import LABELS
+from scenenet.figures import draw_all, plan
+from scenenet.report.context import Material
+from scenenet.report.sections import experiments as experiment_sections
+from scenenet.results.tables import write_tables
+from scenenet.tracking.experiment_runs import Origin, fold_groups, noise_groups, origin_of
+
+
+def noise_runs() -> pd.DataFrame:
+    rows = []
+    for level in (0.0, 0.4, 0.6):
+        for seed in (0, 1):
+            for model, f05 in ((LABELS, 1 - level), ("scenenet", 0.5), ("black box", 0.4)):
+                row = dict.fromkeys(COLUMNS, 0.25) | {"level": level, "share": level}
+                row |= {"seed": seed, "model": model, "alive": True, "truth_f05": f05 + seed / 100}
+                row["training_seconds"] = None if model == LABELS else 2.0
+                rows.append(row)
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture
+def noisy(results):
+    (results.folder / "noise").mkdir()
+    noise_runs().to_csv(results.folder / "noise" / "runs.csv", index=False)
+    return replace(results, contests=("noise",))
+
+
+def test_table_figure_and_section(noisy, thesis):
+    write_tables(noisy, thesis, noisy.folder / "tables", names=())
+    table = pd.read_csv(noisy.folder / "tables" / "noise.csv")
+    assert list(table["model"][:3]) == [LABELS, "scenenet", "black box"]
+    (drawing,) = [d for d in plan(noisy) if d.section == "noise"]
+    (picture,) = draw_all([drawing], noisy.folder / "figures")
+    assert picture.file.stat().st_size > 5000
+    assert "scenenet 0.25 and 0.51" in picture.alt
+    section = experiment_sections.noise(Material(noisy, thesis))
+    assert section is not None
+    assert "scenenet does (2 of 2 trainings, F0.5 0.51" in section.blocks[0].text
+    kinds = [block.kind for block in section.blocks]
+    assert kinds == ["text", "facts", "figure", "notes", "table"]
+
+
+def test_no_contest_no_section(results, thesis):
+    assert experiment_sections.noise(Material(results, thesis)) is None
+    assert all(drawing.section != "noise" for drawing in plan(results))
+
+
+def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
+    groups = noise_groups(noise_runs(), Origin("tiny"))
+    assert len(groups) == 9
+    group = next(g for g in groups if g.parent.name == "scenenet, 60% wrong")
+    assert [child.key for child in group.children] == [
+        "noise/tiny/scenenet, 60% wrong/seed-0",
+        "noise/tiny/scenenet, 60% wrong/seed-1",
+    ]
+    assert group.parent.metrics["truth_f05"] == pytest.approx(0.505)
+    assert group.parent.metrics["truth_f05_std"] == pytest.approx(0.01 / 2**0.5)
+    assert group.children[1].metrics["truth_f05"] == pytest.approx(0.51)
+    assert group.children[1].params == {"level": 0.6, "model": "scenenet", "seed": 1}
+    assert group.parent.seconds == 4.0
+    keys = [record.key for g in groups for record in (g.parent, *g.children)]
+    assert len(set(keys)) == len(keys)
+
+
+def crossed_runs() -> pd.DataFrame:
+    rows = []
+    for model, base in (("scenenet", 0.7), ("cnn", 0.3), ("black box", 0.8)):
+        for seed in (0, 1):
+            for fold, crops in ((1, "a b"), (2, "c d")):
+                row = dict.fromkeys(cross_validation.COLUMNS, 0.5)
+                row |= {"model": model, "seed": seed, "fold": fold, "crops": crops, "alive": True}
+                row |= {"f05": base + seed / 50 + fold / 10, "tp": 5, "fp": 1, "fn": 4, "tn": 90}
+                rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def test_cross_validation_is_the_main_result_where_it_is_there(results, thesis):
+    (results.folder / "cross_validation").mkdir()
+    crossed_runs().to_csv(results.folder / "cross_validation" / "runs.csv", index=False)
+    crossed = replace(results, contests=("cross_validation",))
+    write_tables(crossed, thesis, crossed.folder / "tables", names=())
+    (drawing,) = [d for d in plan(crossed) if d.section == "cross_validation"]
+    (picture,) = draw_all([drawing], crossed.folder / "figures")
+    assert picture.file.stat().st_size > 5000
+    assert "its folds from 0.81 to 0.91" in picture.alt
+    section = experiment_sections.cross_validation(Material(crossed, thesis))
+    assert section is not None and section.title.startswith("Main result")
+    assert "black box 0.960, scenenet 0.860, cnn 0.460" in section.blocks[0].text
+    assert [block.kind for block in section.blocks] == ["text", "facts", "figure", "table"]
+    assert experiment_sections.cross_validation(Material(results, thesis)) is not None
+    (results.folder / "tables" / "cross_validation.csv").unlink()
+    assert experiment_sections.cross_validation(Material(results, thesis)) is None
+
+
+def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():
+    job = {"config": "c", "code": "d", "version": "1", "inputs": {"voxels": "x"}}
+    origin = origin_of("ts40k", {"inputs": {"runs": "y"}}, job)
+    (group, *_) = groups = fold_groups(crossed_runs(), origin)
+    assert [g.parent.name for g in groups] == ["scenenet", "cnn", "black box"]
+    assert [child.key for child in group.children] == [
+        f"cross_validation/ts40k/scenenet/seed-{seed}/fold-{fold}"
+        for seed in (0, 1)
+        for fold in (1, 2)
+    ]
+    assert group.parent.metrics["f05"] == pytest.approx(0.86)
+    assert group.parent.metrics["spread_f05"] == pytest.approx(0.02 / 2**0.5)
+    assert group.parent.metrics["pooled_precision"] == pytest.approx(5 / 6)
+    assert group.children[1].params["crops"] == "c d"
+    assert group.parent.tags["scenenet.code"] == group.children[0].tags["scenenet.code"] == "d"

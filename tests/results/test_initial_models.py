@@ -1,0 +1,71 @@
+"""What a model began with is drawn again, or read from its history."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+import torch
+
+from scenenet.dataset.voxels import VoxelGrid, voxelise
+from scenenet.models.factory import new_model
+from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import MetricSettings, ModelSettings, TrainingSettings
+from scenenet.results.folder import SeedResult
+from scenenet.results.initial_models import DRAWN, FIRST_STEP, start_of
+from scenenet.training.train import fit
+
+
+def result(settings: ModelSettings, history: pd.DataFrame | None = None) -> SeedResult:
+    recorded = {"settings": settings.model_dump(mode="json")}
+    return SeedResult(settings.name, settings.kind, 3, {}, history=history, provenance=recorded)
+
+
+def test_the_thesis_protocol_begins_with_the_numbers_of_the_seed(scene):
+    """A training that takes steps of no length ends where it began."""
+    cloud = scene(((8.5, 9.5),), size=(20, 20), tree=None)
+    crops = [voxelise(cloud, VoxelGrid.metric(cloud.xyz, 1.0), "toy")]
+    still = TrainingSettings(epochs=1, learning_rate=1e-30)
+    for kind in ("scenenet", "cnn"):
+        settings = ModelSettings(name="m", kind=kind, kernel_size=(5, 5, 5), training=still)
+        trained, history = fit(crops, [], settings, seed=3)
+        start = start_of(result(settings, history), trained)
+        assert start is not None
+        assert start.said == DRAWN
+        began, ended = start.model.observer()[0], trained.observer()[0]
+        assert torch.allclose(began, ended, atol=1e-6)
+
+
+def test_kernels_are_shown_at_the_size_that_was_chosen_later():
+    settings = ModelSettings(name="m", kind="scenenet", kernel_size=(9, 9, 9))
+    tuned = new_model(settings, 3).with_kernel_size((9, 5, 5))
+    start = start_of(result(settings), tuned)
+    assert start is not None
+    assert start.model.kernel_size == (9, 5, 5)
+
+
+def test_of_a_search_the_first_row_of_the_history_is_taken():
+    settings = ModelSettings(name="m", kind="scenenet", protocol="field")
+    trained = new_model(settings, 3).at(0.5)
+    assert isinstance(trained, SceneNet)
+    first = trained.shape_parameters() | {"cylinder.r": 0.7}
+    rows = [{"epoch": 1, "loss": 0.9, "search": 2, **first}, {"epoch": 2, "loss": 0.8, **first}]
+    rows[1]["cylinder.r"] = 0.2
+    start = start_of(result(settings, pd.DataFrame(rows)), trained)
+    assert start is not None
+    assert start.said == FIRST_STEP
+    assert isinstance(start.model, SceneNet)
+    assert start.model.shape_parameters()["cylinder.r"] == pytest.approx(0.7)
+    assert start.model.kernel_size == trained.kernel_size
+
+
+def test_a_start_that_looked_at_the_data_is_not_drawn_again():
+    informed = TrainingSettings(init="field")
+    settings = ModelSettings(name="m", kind="scenenet", training=informed)
+    assert start_of(result(settings), new_model(settings, 3)) is None
+    cnn = ModelSettings(name="m", kind="cnn", training=informed)
+    assert start_of(result(cnn), new_model(cnn, 3)) is None
+
+
+def test_without_a_record_and_a_history_nothing_is_said():
+    model = SceneNet(field=MetricSettings())
+    assert start_of(SeedResult("m", "scenenet", 3, {}), model) is None

@@ -1,0 +1,250 @@
+"""Tables hold the numbers of the result files, and the thesis' beside them."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from scenenet.core.errors import InputError
+from scenenet.experiments.published import Thesis, read_thesis
+from scenenet.models.model_file import read_model
+from scenenet.results import tables
+from scenenet.results.folder import Results
+from scenenet.results.score_tables import REACH_TAU, TRIVIAL, WHOLE_TOWERS
+
+
+def row(frame: pd.DataFrame, **where) -> pd.Series:
+    for name, value in where.items():
+        frame = frame[frame[name] == value]
+    assert len(frame) == 1
+    return frame.iloc[0]
+
+
+def test_class_shares_are_those_of_all_points_with_table_5_1_beside(
+    results: Results, thesis: Thesis
+):
+    found = tables.classes(results, thesis)
+    tower = row(found, code=15)
+    assert tower["share_percent"] == pytest.approx(10.0)
+    assert tower["thesis_percent"] == pytest.approx(0.519)
+    assert found["share_percent"].sum() == pytest.approx(100)
+    assert found["thesis_percent"].sum() == pytest.approx(100, abs=0.01)
+    assert list(found["code"]) == list(range(22))
+
+
+def test_class_shares_of_two_surveys_are_weighted_by_their_points(results: Results, thesis: Thesis):
+    south = results.folder / "check" / "south" / "classes.csv"
+    south.parent.mkdir()
+    south.write_text("code,class,points,share_percent\n15,Power line support tower,10000,100\n")
+    both = replace(results, surveys=["north", "south"])
+    tower = row(tables.classes(both, thesis), code=15)
+    assert tower["share_percent"] == pytest.approx(100 * 11_000 / 20_000)
+    assert (tower["lowest_percent"], tower["highest_percent"]) == pytest.approx((10, 100))
+
+
+def test_tower_properties_leave_out_the_missing_last_spacing(results: Results, thesis: Thesis):
+    found = tables.towers(results, thesis)
+    spacing = row(found, property="spacing")
+    assert (spacing["towers"], spacing["mean"]) == (2, 300)
+    height = row(found, property="height")
+    assert (height["mean"], height["lowest"], height["highest"]) == (30, 20, 40)
+    assert (height["thesis_mean"], height["thesis_lowest"]) == (34.74, 18)
+
+
+def test_voxelisation_time_is_the_mean_over_crops(results: Results, thesis: Thesis):
+    found = row(tables.voxelisation(results, thesis), grid="cube-64")
+    assert found["seconds"] == pytest.approx(0.2)
+    assert found["thesis_seconds"] == 0.45
+    assert found["tower_share_percent"] == pytest.approx(2.5)
+
+
+def test_models_have_mean_and_spread_over_seeds(results: Results, thesis: Thesis):
+    found = row(tables.models(results, thesis), model="scenenet", counted="all seeds")
+    assert found["precision"] == pytest.approx(0.7)
+    assert found["precision_std"] == pytest.approx(0.1 * math.sqrt(2))
+    assert (found["parameters"], found["live_share"], found["n_seeds"]) == (11, 1, 2)
+    assert (found["thesis_precision"], found["thesis_precision_std"]) == (0.68, 0.08)
+
+
+def test_dead_seeds_count_and_the_live_ones_are_told_apart(results: Results, thesis: Thesis):
+    found = tables.models(results, thesis)
+    every = row(found, model="cnn", counted="all seeds")
+    live = row(found, model="cnn", counted="live seeds")
+    assert every["precision"] == pytest.approx(0.2)
+    assert every["live_share"] == 0.5
+    assert live["precision"] == pytest.approx(0.4)
+    assert (live["n_seeds"], every["parameters"]) == (1, 2190)
+    assert math.isnan(live["precision_std"])
+    assert "live seeds" not in set(found.loc[found["model"] == "scenenet", "counted"])
+
+
+def test_the_trivial_baseline_has_a_row_of_its_own(results: Results, thesis: Thesis):
+    trivial = row(tables.models(results, thesis), model=TRIVIAL)
+    assert trivial["miou"] == pytest.approx(0.499)
+    assert trivial["precision"] == 0
+
+
+def test_the_seed_that_predicts_is_the_best_on_validation(results: Results, thesis: Thesis):
+    found = tables.models(results, thesis)
+    best = found[found["counted"].str.contains("best on validation")]
+    assert list(best["counted"]) == ["seed 0, best on validation"] * 2
+    assert best.iloc[0]["precision"] == pytest.approx(0.8)
+
+
+def test_seeds_stand_one_by_one(results: Results, thesis: Thesis):
+    found = tables.seeds(results, thesis)
+    assert len(found) == 4
+    dead = row(found, model="cnn", seed=1)
+    assert not dead["alive"]
+    assert (dead["epochs"], dead["training_seconds"]) == (4, 8)
+
+
+def test_position_errors_are_those_of_seeds_that_hit_something(results: Results, thesis: Thesis):
+    found = row(tables.tower_scores(results, thesis), model="cnn", counted="all seeds")
+    assert found["median_error_m"] == 1.5
+
+
+def test_training_time_is_the_sum_of_the_epochs(results: Results, thesis: Thesis):
+    found = row(tables.times(results, thesis), model="scenenet")
+    assert (found["training_seconds"], found["seconds_per_epoch"]) == (8, 2)
+    assert found["thesis_training_seconds"] == 85 * 60
+
+
+def test_time_until_a_useful_model_counts_the_dead_ones(results: Results, thesis: Thesis):
+    found = row(tables.times(results, thesis), model="cnn")
+    assert (found["live_share"], found["useful_seconds"]) == (0.5, 16)
+    assert (found["thesis_useful_seconds"], found["thesis_inference_ms"]) == (8 * 3600, 43)
+
+
+def test_inference_and_memory_are_as_measured(results: Results, thesis: Thesis):
+    found = tables.times(results, thesis)
+    scenenet, cnn = row(found, model="scenenet"), row(found, model="cnn")
+    assert (scenenet["inference_ms"], scenenet["inference_ms_128"]) == (8, 50)
+    assert (cnn["inference_ms"], scenenet["peak_memory_mb"]) == (12, 501)
+    assert math.isnan(cnn["inference_ms_128"])
+
+
+def test_the_black_box_is_timed_beside_the_models(results: Results, thesis: Thesis):
+    folder = results.folder / "black_box"
+    folder.mkdir()
+    evaluation = (results.folder / "evaluate" / "scenenet" / "seed-0.json").read_text()
+    for seed in results.seeds:
+        (folder / f"seed-{seed}.json").write_text(evaluation)
+    times = {"training_seconds": [3, 5], "inference_ms": {"64": 30}, "peak_memory_mb": 900}
+    (folder / "times.json").write_text(json.dumps(times))
+    found = row(tables.times(results, thesis), model="black box")
+    assert (found["training_seconds"], found["useful_seconds"]) == (4, 4)
+    assert (found["inference_ms"], found["peak_memory_mb"]) == (30, 900)
+
+
+def test_numbers_are_in_metres_with_their_start_and_the_thesis_beside(
+    results: Results, thesis: Thesis, growth: float
+):
+    found = tables.parameters(results, thesis)
+    assert len(found) == 12
+    assert set(found["model"]) == {"scenenet"}
+    drawn = [read_model(r.model_files[0])[0].shape_parameters() for r in results.trained
+             if r.kind == "scenenet"]  # fmt: skip
+    for name, factor, unit in (("cylinder.r", 1.3, "m"), ("arrow.sigma", 1.3**2, "m^2"),
+                               ("negative_sphere.omega", 1, "1")):  # fmt: skip
+        values = [factor * numbers[name] for numbers in drawn]
+        entry = row(found, parameter=name)
+        assert entry["mean"] == pytest.approx(sum(values) / 2)
+        assert entry["std"] == pytest.approx(abs(values[0] - values[1]) / math.sqrt(2))
+        assert entry["initial"] == pytest.approx(entry["mean"] / growth, rel=1e-4)
+        assert entry["unit"] == unit
+        assert len(entry["sentence"]) > 20
+    share = row(found, parameter="lambda.negative_sphere")
+    assert share["thesis"] == pytest.approx(0.7634)
+    weights = found[found["symbol"] == "λ"]
+    assert weights["mean"].sum() == pytest.approx(1, abs=1e-5)
+
+
+def test_what_is_certain_of_each_model_stands_in_rows(results: Results, thesis: Thesis):
+    found = tables.certificate(results, thesis)
+    counts = found["model"].value_counts()
+    assert (counts["scenenet"], counts["cnn"]) == (8, 2)
+    convex = row(found, model="scenenet", property="convex combination of GENEOs")
+    assert convex["value"] == pytest.approx(1, abs=1e-5)
+    assert "cylinder" in convex["found"]
+    moved = tables.turns(results, thesis)
+    straight = row(moved, model="scenenet", degrees=0)
+    assert straight["mean_h"] == 0
+    assert moved["degrees"].isna().sum() == 2
+
+
+def test_every_table_is_written_and_reads_back(results: Results, thesis: Thesis, tmp_path: Path):
+    paths = tables.write_tables(results, thesis, tmp_path / "tables")
+    assert {path.stem for path in paths} == set(tables.TABLES)
+    for path in paths:
+        assert len(pd.read_csv(path)) > 0, path.name
+
+
+def test_stages_that_did_not_run_leave_columns_without_rows(thesis: Thesis, tmp_path: Path):
+    empty = Results(tmp_path, models={"scenenet": "scenenet"}, seeds=[0], surveys=["north"])
+    for path in tables.write_tables(empty, thesis, tmp_path / "tables"):
+        read = pd.read_csv(path)
+        assert len(read) == 0
+        assert len(read.columns) > 3
+
+
+def test_a_broken_result_is_named(results: Results, thesis: Thesis):
+    broken = results.folder / "evaluate" / "cnn" / "seed-0.json"
+    broken.write_text("{")
+    with pytest.raises(InputError, match=r"evaluate/cnn/seed-0\.json: is not JSON"):
+        tables.seeds(results, thesis)
+
+
+def test_published_numbers_have_a_place_and_a_value_or_a_bound(thesis: Thesis):
+    assert len(thesis.numbers) > 90
+    for name, number in thesis.numbers.items():
+        known = (number.value, number.low, number.high)
+        assert number.place, name
+        assert any(part is not None for part in known), name
+
+
+def test_a_misspelt_published_number_is_named(tmp_path: Path):
+    file = tmp_path / "thesis.yaml"
+    file.write_text("source: s\nnumbers:\n  a.b: {valu: 1, place: p}\n")
+    with pytest.raises(InputError, match=r"numbers\.a\.b\.valu"):
+        read_thesis(file)
+
+
+def test_the_black_box_stands_beside_the_models(results: Results, thesis: Thesis):
+    source = results.folder / "evaluate" / "scenenet" / "seed-0.json"
+    entry = json.loads(source.read_text()) | {"parameters": 1000}
+    for seed, precision in ((0, 0.9), (1, 0.7)):
+        entry["voxel"] = entry["voxel"] | {"precision": precision}
+        out = results.folder / "black_box" / f"seed-{seed}.json"
+        out.parent.mkdir(exist_ok=True)
+        out.write_text(json.dumps(entry))
+    found = row(tables.models(results, thesis), model="black box")
+    assert found["precision"] == pytest.approx(0.8)
+    assert (found["parameters"], found["n_seeds"]) == (1000, 2)
+
+
+def test_both_ways_to_count_stand_beside_each_other(results: Results, thesis: Thesis):
+    for seed in results.seeds:
+        path = results.folder / "evaluate" / "scenenet" / f"seed-{seed}.json"
+        told = json.loads(path.read_text())
+        told["voxel_towers"] = {**told["voxel_towers"], "f05": 0.5 + 0.1 * seed}
+        told["whole_towers"] = True
+        told["voxel"] = told["voxel_towers"]
+        path.write_text(json.dumps(told))
+    fresh = replace(results)
+    table = tables.whole_towers(fresh).set_index("model")
+    expected = np.mean([0.5 + 0.1 * seed for seed in results.seeds])
+    assert table.loc["scenenet", "towers_f05"] == pytest.approx(expected)
+    seeds = tables.seeds(fresh)
+    by_observer = [r.evaluation["voxel_observer"]["f05"] for r in fresh.of_model("scenenet")]
+    assert table.loc["scenenet", "tau_f05"] == pytest.approx(np.mean(by_observer))
+    models = tables.models(fresh, thesis).set_index("model")
+    assert set(models.loc["scenenet", "voxels"]) == {WHOLE_TOWERS}
+    assert set(np.atleast_1d(models.loc["cnn", "voxels"])) == {REACH_TAU}
+    assert seeds[seeds["model"] == "scenenet"]["f05"].mean() == pytest.approx(expected)

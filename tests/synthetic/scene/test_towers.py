@@ -1,0 +1,82 @@
+"""Towers and the wires between them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenenet.synthetic.returns.conductors import catenary, string_wires
+from scenenet.synthetic.scene.towers import KINDS, place, sample
+
+KINDS_AND_CIRCUITS = [(kind, circuits) for kind in KINDS for circuits in (1, 2)]
+
+
+@pytest.mark.parametrize(("kind", "circuits"), KINDS_AND_CIRCUITS)
+def test_tower_is_as_high_as_asked_and_stands_on_its_foot(kind, circuits):
+    tower = KINDS[kind](18.0, circuits, 1)
+    ends = tower.members[:, :6].reshape(-1, 3)
+    assert ends[:, 2].max() == pytest.approx(18.0, abs=0.25)
+    assert ends[:, 2].min() < 0, "legs go on below the foot, for slopes"
+
+
+@pytest.mark.parametrize(("kind", "circuits"), KINDS_AND_CIRCUITS)
+@pytest.mark.parametrize("earth_wires", [0, 1])
+def test_every_wire_has_its_place_on_the_tower(kind, circuits, earth_wires):
+    tower = KINDS[kind](18.0, circuits, earth_wires)
+    assert tower.attachments.shape == (3 * circuits + earth_wires, 3)
+    ends = tower.members[:, :6].reshape(-1, 3)
+    for wire in tower.attachments:
+        assert np.linalg.norm(ends - wire, axis=1).min() < 0.3
+    assert tower.attachments[:, 2].min() > 0.6 * 18.0
+
+
+def test_pylon_has_the_square_base_of_the_thesis():
+    tower = KINDS["lattice"](34.74, 1, 0)
+    assert 2 * tower.half_base == pytest.approx(4.15, rel=0.02)
+    ends = tower.members[:, :6].reshape(-1, 3)
+    foot = ends[ends[:, 2] == 0]
+    np.testing.assert_allclose(np.abs(foot[:, :2]), tower.half_base)
+    high = ends[np.abs(ends[:, 2] - 0.94 * 34.74) < 1e-9]
+    assert np.abs(high[:, :2]).max() < 0.4 * tower.half_base, "a pyramid narrows"
+
+
+def test_kinds_differ():
+    counts = {kind: len(KINDS[kind](18.0, 1, 0).members) for kind in KINDS}
+    assert len(set(counts.values())) >= 4
+
+
+def test_sampled_points_lie_on_the_members_with_one_density():
+    members = np.array([[0, 0, 0, 0, 0, 30, 0.5, 0.5], [0, 0, 10, 8, 0, 10, 0.1, 0.1]], float)
+    points = sample(members, 200.0, np.random.default_rng(0))
+    mast = np.abs(np.hypot(points[:, 0], points[:, 1]) - 0.5) < 1e-9
+    arm = np.abs(np.hypot(points[:, 1], points[:, 2] - 10) - 0.1) < 1e-9
+    assert (mast | arm).all()
+    assert mast.sum() == pytest.approx(200 * 30 * np.pi, rel=0.05)
+    assert (arm & ~mast).sum() == pytest.approx(200 * 8 * np.pi * 0.2, rel=0.1)
+
+
+def test_arms_stand_across_the_line():
+    east = place(np.array([[1.0, 0.0, 2.0], [0.0, 1.0, 2.0]]), 10, 20, 30, azimuth=0.0)
+    np.testing.assert_allclose(east, [[10, 19, 32], [11, 20, 32]], atol=1e-12)
+
+
+@pytest.mark.parametrize("rise", [-20.0, 0.0, 35.0])
+def test_wire_ends_where_it_is_held_and_hangs_below_the_chord(rise):
+    start, end = np.array([5.0, 5.0, 40.0]), np.array([95.0, 125.0, 40.0 + rise])
+    u = np.linspace(0, 1, 101)
+    wire = catenary(start, end, 1000.0, u)
+    np.testing.assert_allclose(wire[[0, -1]], [start, end], atol=1e-9)
+    below = (start + u[:, None] * (end - start) - wire)[:, 2]
+    assert (below[1:-1] > 0).all()
+    assert below.max() == pytest.approx(150**2 / (8 * 1000), rel=0.05)
+
+
+def test_scan_lines_meet_wires_and_only_the_scanned_part():
+    starts, ends = np.array([[0, -1, 10], [0, 1, 10.0]]), np.array([[100, -1, 10], [100, 1, 10.0]])
+    rng = np.random.default_rng(0)
+    points = string_wires(starts, ends, 900.0, 0.2, 0.8, rng, (0.25, 0.75))
+    assert points[:, 0].min() >= 25
+    assert points[:, 0].max() <= 75
+    assert len(points) == pytest.approx(2 * 50 / 0.2 * 0.8, rel=0.1)
+    steps = np.diff(np.sort(points[points[:, 1] < 0, 0]))
+    assert np.median(steps) == pytest.approx(0.2, rel=0.2), "in steps, not anywhere"

@@ -1,0 +1,115 @@
+"""Starts that look at the data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from scenenet.convolution.convolve import convolve_at_voxels
+from scenenet.dataset.batches import batch
+from scenenet.dataset.voxels import VoxelGrid, voxelise
+from scenenet.geneo import kernel_named
+from scenenet.models.answers import threshold_curve
+from scenenet.models.factory import new_model
+from scenenet.models.settings import ModelSettings, TrainingSettings
+from scenenet.training.initialisation import discriminant, informed_model, starting_model
+from scenenet.training.train import fit
+
+
+@pytest.fixture(scope="module")
+def toys(scene):
+    clouds = [scene(((8.5 + i, 9.5),), size=(20, 20), tree=(14, 4 + i), seed=i) for i in range(3)]
+    return [voxelise(c, VoxelGrid.metric(c.xyz, 1.0), f"toy-{i}") for i, c in enumerate(clouds)]
+
+
+def settings(kind: str, init: str = "field", epochs: int = 20) -> ModelSettings:
+    training = TrainingSettings(init=init, epochs=epochs, batch_size=2, learning_rate=0.01)
+    return ModelSettings(name="m", kind=kind, kernel_size=(5, 5, 5), training=training)
+
+
+def best(model, samples) -> float:
+    return threshold_curve(model, samples, "presence").best()[1].f05
+
+
+def test_the_discriminant_answers_higher_at_towers_than_a_mean_difference_does(toys):
+    size = (5, 5, 5)
+    kernel = discriminant(toys, "presence", size)
+    assert kernel.shape == size
+
+    def separation(direction: torch.Tensor) -> float:
+        answers, towers = [], []
+        for sample in toys:
+            occupancy, _ = batch([sample], "presence")
+            answers.append(convolve_at_voxels(occupancy, direction[None])[0].numpy())
+            towers.append(sample.tower)
+        answer, tower = np.concatenate(answers), np.concatenate(towers)
+        within = np.where(tower, answer[tower].mean(), answer[~tower].mean())
+        apart = answer[tower].mean() - answer[~tower].mean()
+        return float(apart / (answer - within).std())
+
+    generator = torch.Generator().manual_seed(0)
+    others = [torch.rand(size, generator=generator) - 0.5 for _ in range(20)]
+    assert separation(kernel) > 2 * max(separation(other) for other in others)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["scenenet", "cnn"])
+def test_it_begins_where_towers_are_told_from_the_rest(toys, kind, seed):
+    assert best(informed_model(settings(kind), seed, toys), toys) > 0.2
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_cnn_is_alive_after_training(toys, seed):
+    model, _ = fit(toys, [], settings("cnn"), seed)
+    assert best(model, toys) > 0.2
+
+
+@pytest.mark.parametrize("kind", ["scenenet", "cnn"])
+def test_seeds_begin_apart_and_one_seed_begins_at_one_place(toys, kind):
+    one, same, other = (informed_model(settings(kind), s, toys) for s in (1, 1, 2))
+    for a, b in zip(one.parameters(), same.parameters(), strict=True):
+        assert torch.equal(a, b)
+    pairs = zip(one.parameters(), other.parameters(), strict=True)
+    assert any(not torch.equal(a, b) for a, b in pairs)
+
+
+def test_the_thesis_start_is_the_one_that_is_drawn_from_the_ranges(toys):
+    begun = starting_model(settings("scenenet", "thesis"), 3, toys)
+    drawn = new_model(settings("scenenet", "thesis"), 3)
+    assert begun.shape_parameters() == drawn.shape_parameters()
+    for name in begun.names:
+        for parameter in kernel_named(name).parameters:
+            value = begun.shape_parameters()[f"{name}.{parameter.name}"]
+            assert parameter.low <= value <= parameter.high
+
+
+def test_without_ranges_numbers_are_normal_and_mostly_outside_of_them(toys):
+    told = [
+        starting_model(settings("scenenet", "unranged"), seed, toys).numbers() for seed in range(60)
+    ]
+    drawn = np.concatenate(told)
+    assert abs(drawn.mean()) < 0.15
+    assert abs(drawn.std() - 1) < 0.1
+    assert 0.4 < (drawn < 0).mean() < 0.6
+    again = starting_model(settings("scenenet", "unranged"), 7, toys).numbers()
+    np.testing.assert_array_equal(told[7], again)
+
+
+def test_values_by_hand_lie_in_their_ranges_and_are_the_same_for_every_seed(toys):
+    chosen = settings("scenenet", "handcrafted")
+    chosen = chosen.model_copy(update={"geneos": ("cylinder", "arrow", "negative_sphere", "arrow")})
+    one, other = (starting_model(chosen, seed, toys) for seed in (0, 1))
+    numbers = one.shape_parameters()
+    assert numbers == other.shape_parameters()
+    for name, geneo in zip(one.names, one.geneos, strict=True):
+        assert numbers[f"lambda.{name}"] == pytest.approx(0.25)
+        for parameter in kernel_named(geneo).parameters:
+            assert parameter.low <= numbers[f"{name}.{parameter.name}"] <= parameter.high
+    assert numbers["cylinder.r"] == pytest.approx(2.0)  # half of 4.15 m, in voxels of a metre
+
+
+@pytest.mark.parametrize("init", ["unranged", "handcrafted"])
+def test_a_cnn_has_no_ranges_to_leave(init):
+    with pytest.raises(ValueError, match=r"training.init .* a CNN has no ranges"):
+        settings("cnn", init)

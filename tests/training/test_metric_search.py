@@ -1,0 +1,240 @@
+"""A SCENE-Net in metres: its constraints, its training, its file."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenenet.core.errors import InputError
+from scenenet.dataset.voxels import VoxelGrid, voxelise
+from scenenet.geneo import kernel_named
+from scenenet.models.answers import probabilities, threshold_curve
+from scenenet.models.model_file import ModelCard, read_model, write_model
+from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import MetricSettings, ModelSettings, SearchSettings, TuningSettings
+from scenenet.training import metric_search as field
+from scenenet.training.train import fit
+from scenenet.training.tuning import choose
+
+SMALL = MetricSettings(radius=2.0, above=3.0, below=3.0)
+
+
+def settings(generations: int = 6, **changes) -> ModelSettings:
+    search = SearchSettings(searches=2, trial=2, starts=12, population=8, generations=generations)
+    return ModelSettings(
+        name="m", kind="scenenet", protocol="field", field=SMALL, search=search, **changes
+    )
+
+
+def net(seed: int = 0, lengths: MetricSettings = SMALL) -> SceneNet:
+    return SceneNet(field=lengths, generator=torch.Generator().manual_seed(seed))
+
+
+@pytest.fixture(scope="module")
+def toys(scene):
+    """Four toy crops with a pole each, of voxels of 0.9 to 1.2 m."""
+    clouds = [scene(((8.5 + i, 9.5),), size=(20, 20), tree=(14, 4 + i), seed=i) for i in range(4)]
+    return [
+        voxelise(c, VoxelGrid.metric(c.xyz, 0.9 + 0.1 * i), f"toy-{i}")
+        for i, c in enumerate(clouds)
+    ]
+
+
+def assert_constrained(numbers: dict[str, float]) -> None:
+    """Positive parameters and a convex combination (thesis 4.5)."""
+    weights = [v for k, v in numbers.items() if k.startswith("lambda.")]
+    assert min(weights) >= 0
+    assert sum(weights) == pytest.approx(1, abs=1e-5)
+    for name, value in numbers.items():
+        if not name.startswith("lambda."):
+            kernel, symbol = name.split(".")
+            ranges = {p.name: p.metric_range for p in kernel_named(kernel).parameters}
+            low, high = ranges[symbol]
+            assert low * (1 - 1e-5) <= value <= high * (1 + 1e-5)
+            assert value > 0
+
+
+@given(st.lists(st.floats(-1e4, 1e4), min_size=11, max_size=11))
+def test_whatever_the_numbers_are_the_constraints_hold(raw):
+    model = net()
+    assert model.n_parameters() == 11
+    model.set_numbers(np.array(raw))
+    assert_constrained(model.shape_parameters())
+    assert torch.isfinite(model.observer()[0]).all()
+
+
+def test_they_hold_at_every_step_and_in_the_saved_model(toys, tmp_path):
+    model, history = fit(toys[:3], toys[3:], settings(), 0)
+    shown = list(model.shape_parameters())
+    for _, row in history.iterrows():
+        assert_constrained(row[shown].to_dict())
+    card = card_for(model)
+    write_model(tmp_path / "m.json", model, card)
+    assert_constrained(read_model(tmp_path / "m.json")[0].shape_parameters())
+
+
+def test_the_search_finds_the_poles_and_gets_no_worse(toys):
+    model, history = fit(toys[:3], toys[3:], settings(15), 0)
+    assert history["epoch"].tolist() == list(range(1, 16))
+    assert (history["loss"].diff().iloc[1:-1] <= 0).all()
+    assert history["loss"].iloc[-1] < 0.4
+    assert history["validation_f05"].iloc[-1] > 0.5
+    assert model.shape_parameters()["cylinder.r"] == history["cylinder.r"].iloc[-1]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_start_is_dead(toys, seed):
+    model, _ = fit(toys[:3], [], settings(2), seed)
+    assert threshold_curve(model, toys[:3], "presence").best()[1].f05 > 0.3
+
+
+def test_same_seed_same_numbers_and_other_seed_other_numbers(toys):
+    (a, one), (b, two), (c, _) = (fit(toys[:2], toys[3:], settings(3), s) for s in (1, 1, 2))
+    assert a.numbers().tolist() == b.numbers().tolist()
+    assert a.numbers().tolist() != c.numbers().tolist()
+    pd.testing.assert_frame_equal(
+        one.drop(columns="seconds"), two.drop(columns="seconds"), check_exact=True
+    )
+
+
+class PowerCut(Exception):
+    pass
+
+
+def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
+    straight, straight_history = fit(toys[:2], [], settings(5), 1)
+    original, done = field.advance, iter(range(2 * 2 + 1))  # trials and one more
+
+    def interrupted(*args):
+        if next(done, None) is None:
+            raise PowerCut
+        return original(*args)
+
+    monkeypatch.setattr(field, "advance", interrupted)
+    with pytest.raises(PowerCut):
+        fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
+    monkeypatch.undo()
+    monkeypatch.setattr(field, "begin", None)  # whoever begins anew fails
+    resumed, history = fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
+    assert resumed.numbers().tolist() == straight.numbers().tolist()
+    pd.testing.assert_frame_equal(
+        history.drop(columns="seconds"), straight_history.drop(columns="seconds"), check_exact=True
+    )
+
+
+@pytest.mark.parametrize("what", ["another seed", "nothing but noise"])
+def test_a_checkpoint_of_something_else_is_ignored(toys, tmp_path, what):
+    checkpoint = tmp_path / "c"
+    fit(toys[:2], [], settings(2), 7, checkpoint=checkpoint)
+    if what == "nothing but noise":
+        checkpoint.write_bytes(checkpoint.read_bytes()[:40])
+    fresh, _ = fit(toys[:2], [], settings(2), 1)
+    model, history = fit(toys[:2], [], settings(2), 1, checkpoint=checkpoint)
+    assert len(history) == 2
+    assert model.numbers().tolist() == fresh.numbers().tolist()
+
+
+def test_half_the_voxel_size_covers_the_same_metres():
+    model = net(1)
+    fine = model.at(0.5)
+    assert model.kernel_size == (7, 5, 5)
+    assert fine.kernel_size == (13, 9, 9)
+    assert fine.shape_parameters() == model.shape_parameters()
+    assert fine.at(1.0).kernel_size == model.kernel_size
+    # The same places of the kernels; H is weighted by the voxel size.
+    sphere, of_fine = model.kernels()[2], fine.kernels()[2]
+    torch.testing.assert_close(of_fine[::2, ::2, ::2], sphere / 2)
+
+
+def test_a_finer_model_learns_with_the_other():
+    model = net(1)
+    fine = model.at(0.5)
+    model.set_numbers(np.zeros(11))
+    assert fine.shape_parameters() == model.shape_parameters()
+
+
+def test_a_column_of_so_many_metres_has_the_same_answer_on_every_grid():
+    answers = []
+    for voxel_size in (1.0, 0.5, 0.25):
+        model = net(4).at(voxel_size)
+        kz, ky, kx = model.kernel_size
+        kernel = model.kernels()[0]  # the cylinder; each of its slices is the same
+        inside = kernel[:, ky // 2, kx // 2]
+        answers.append(inside[kz // 2 :][: round(3 / voxel_size)].sum().item())
+    assert max(answers) / min(answers) < 1.2
+
+
+def test_kernels_lie_within_their_lengths_and_sum_to_zero():
+    lengths = MetricSettings(radius=2.0, above=4.0, below=2.0)
+    kernels = net(2, lengths).kernels()
+    assert kernels.shape[1:] == (9, 5, 5)
+    assert (kernels[:, :2] == 0).all()  # 2 m down, 4 m up
+    assert (kernels[:, 2:].abs().sum(dim=(0, 2, 3)) > 0).all()
+    assert (kernels[:, :, 0, 0] == 0).all()  # a disc has no corners
+    assert kernels[:2].sum(dim=(2, 3)).abs().max() < 1e-5
+    torch.testing.assert_close(kernels.rot90(1, (2, 3)), kernels)
+
+
+def test_an_empty_voxel_is_no_tower(toys):
+    probability, _ = probabilities(net(3), toys[0], "presence")
+    empty = np.ones(len(probability), bool)
+    empty[toys[0].index] = False
+    assert (probability[empty] == 0).all()
+    assert probability.max() <= 1
+
+
+def card_for(model: SceneNet) -> ModelCard:
+    return ModelCard(
+        name="m", codes="edp", measurement="presence", fit="cube", resolution=64,
+        voxel_size=0.9, tau=0.5,
+    )  # fmt: skip
+
+
+def test_its_file_says_metres_and_reads_back(tmp_path):
+    model = net(5)
+    write_model(tmp_path / "m.json", model, card_for(model))
+    written = json.loads((tmp_path / "m.json").read_text())
+    assert written["units"] == "m"
+    assert written["format_version"] == 2
+    assert written["field"]["radius"] == 2.0
+    radius, sigma = (written["geneos"][0]["parameters"][s] for s in ("r", "sigma"))
+    assert (radius["unit"], sigma["unit"]) == ("m", "m^2")
+    assert radius["value"] == pytest.approx(model.shape_parameters()["cylinder.r"])
+    again, _ = read_model(tmp_path / "m.json")
+    assert again.field == SMALL
+    assert again.voxel_size == 0.9
+    torch.testing.assert_close(again.observer()[0], model.at(0.9).observer()[0])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [("r", -1.0, "does not lie within"), ("sigma", 99.0, "does not lie within")],
+)
+def test_a_file_with_a_number_out_of_bounds_is_refused(tmp_path, name, value, message):
+    write_model(tmp_path / "m.json", net(), card_for(net()))
+    written = json.loads((tmp_path / "m.json").read_text())
+    written["geneos"][0]["parameters"][name]["value"] = value
+    (tmp_path / "m.json").write_text(json.dumps(written))
+    with pytest.raises(InputError, match=message):
+        read_model(tmp_path / "m.json")
+
+
+def test_it_has_no_other_kernel_size():
+    with pytest.raises(InputError, match="in metres"):
+        net().with_kernel_size((9, 9, 9))
+
+
+def test_tau_is_chosen_on_the_training_crops_as_well(toys):
+    model, _ = fit(toys[:3], [], settings(3), 0)
+    sizes = TuningSettings(kernel_sizes=((9, 5, 5),))
+    _, card, result = choose(model, card_for(model), toys[3:], sizes, toys[:3])
+    everything = threshold_curve(model, toys, "presence")
+    assert len(result["kernel_sizes"]) == 1
+    assert card.tau in everything.tau
+    assert result["validation"]["n_samples"] == 1

@@ -1,0 +1,97 @@
+"""What is chosen on the validation part: tau, the kernel size, the champion."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from scenenet.core.files import read_json
+from scenenet.dataset.voxels import VoxelGrid, voxelise
+from scenenet.metrics.threshold_curve import THRESHOLDS
+from scenenet.metrics.voxel_scores import confusion
+from scenenet.models.answers import probabilities
+from scenenet.models.cnn import CNN
+from scenenet.models.model_file import read_model, write_model
+from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import TuningSettings
+from scenenet.training.tuning import champion, choose, tune
+
+
+@pytest.fixture(scope="module")
+def crops(scene):
+    clouds = [scene(((10.5, 12.5),), size=(22, 22), tree=(5, 5 + i), seed=i) for i in range(2)]
+    return [voxelise(c, VoxelGrid.metric(c.xyz, 1.0), f"crop-{i}") for i, c in enumerate(clouds)]
+
+
+def f05_at(model, crops, tau: float) -> float:
+    each = (probabilities(model, crop, "presence") for crop in crops)
+    one, other = (confusion(probability, truth, tau) for probability, truth in each)
+    return (one + other).f05
+
+
+def test_tau_is_where_f05_is_highest_on_validation(pole_finder, crops):
+    model, card = pole_finder
+    _, tuned, result = choose(model, card, crops, TuningSettings())
+    assert tuned.tau == result["tau"]
+    assert result["validation"]["f05"] == pytest.approx(f05_at(model, crops, tuned.tau))
+    for tau in THRESHOLDS[::40]:
+        assert f05_at(model, crops, tau) <= result["validation"]["f05"]
+    assert max(result["curve"]["f05"]) == result["validation"]["f05"]
+    assert result["curve"]["tau"] == THRESHOLDS.tolist()
+    assert result["validation"]["n_samples"] == 2
+
+
+def test_the_better_kernel_size_is_chosen(pole_finder, crops):
+    model, card = pole_finder
+    flat = model.with_kernel_size((1, 3, 3))  # sees nothing that stands
+    settings = TuningSettings(kernel_sizes=((1, 3, 3), (9, 9, 9)))
+    chosen, _, result = choose(flat, card, crops, settings)
+    assert chosen.kernel_size == (9, 9, 9)
+    assert result["kernel_size"] == [9, 9, 9]
+    tried = {tuple(entry["kernel_size"]): entry["f05"] for entry in result["kernel_sizes"]}
+    assert list(tried) == [(1, 3, 3), (9, 9, 9)]
+    assert tried[9, 9, 9] == result["validation"]["f05"] > tried[1, 3, 3]
+    assert chosen.shape_parameters() == model.shape_parameters()
+
+
+def test_the_size_it_was_trained_with_wins_a_tie(crops, pole_finder):
+    _, card = pole_finder
+    blind = SceneNet(["cylinder"], (1, 1, 1))  # one voxel less its own mean: all zero
+    settings = TuningSettings(kernel_sizes=((1, 1, 1), (3, 1, 1)))
+    chosen, tuned, result = choose(blind, card, crops, settings)
+    assert chosen.kernel_size == (1, 1, 1)
+    assert result["validation"]["f05"] == 0
+    assert tuned.tau == THRESHOLDS[-1]
+
+
+def test_a_cnn_has_no_other_size(crops, pole_finder):
+    _, card = pole_finder
+    settings = TuningSettings(kernel_sizes=((3, 3, 3),))
+    _, _, result = choose(CNN(1, (5, 5, 5)), card, crops, settings)
+    assert [entry["kernel_size"] for entry in result["kernel_sizes"]] == [[5, 5, 5]]
+
+
+def test_only_validation_crops_are_looked_at(chain, pole_finder, tmp_path):
+    model, card = pole_finder
+    write_model(tmp_path / "m.json", model, card.model_copy(update={"tau": None}))
+    result = tune(
+        tmp_path / "m.json", [chain.voxels], chain.split, TuningSettings(),
+        tmp_path / "tuned.json", tmp_path / "tuning.json",
+    )  # fmt: skip
+    assert result["validation"]["n_samples"] == 1
+    assert read_json(tmp_path / "tuning.json") == result
+    assert read_model(tmp_path / "tuned.json")[1].tau == result["tau"]
+
+
+def test_the_champion_is_the_best_on_validation(tmp_path, pole_finder):
+    model, card = pole_finder
+    models, tunings = [], []
+    for seed, f05 in enumerate([0.2, 0.6, 0.6, 0.1]):
+        models.append(tmp_path / f"seed-{seed}.json")
+        write_model(models[-1], model, card.model_copy(update={"provenance": {"seed": seed}}))
+        tunings.append(tmp_path / f"tuning-{seed}.json")
+        tunings[-1].write_text(json.dumps({"validation": {"f05": f05}}))
+    result = champion(models, tunings, tmp_path / "champion.json")
+    assert result == {"chosen": "seed-1.json", "validation": {"f05": 0.6}}
+    assert (tmp_path / "champion.json").read_bytes() == models[1].read_bytes()

@@ -37,10 +37,29 @@ INTERRUPTED = 130
 app = typer.Typer(
     help="Find power-line towers in LiDAR surveys with SCENE-Net: eleven numbers with a meaning.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from scenenet.core.provenance import package_version
+
+        print(f"scenenet {package_version()}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _of_every_command(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Find power-line towers in LiDAR surveys with SCENE-Net, and explain each of them."""
 
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print the answer as JSON on stdout.")]
@@ -257,7 +276,10 @@ def explain(
     """Write a page that says for every tower why it is one."""
     from dataclasses import asdict
 
+    from scenenet.core.extras import require
     from scenenet.prediction.settings import PredictSettings
+
+    require("report", "scenenet explain")  # before the survey is predicted, which takes minutes
     from scenenet.report.explanation_page import explain_survey
 
     found = explain_survey(survey, model, out, PredictSettings(), _detection(min_wire))

@@ -1,12 +1,12 @@
 # Two commands: `make reproduce` makes every result, `make test` runs the tests.
-# Both make .venv with the tested versions first, if it is not there or out of date.
+# Every target creates .venv with the tested versions first, where it is missing or out of date.
 
 PYTHON ?= python3
 CORES ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
-.PHONY: reproduce test bench pictures lint clean help
+.PHONY: reproduce test package docs bench pictures lint clean help
 
 reproduce: $(INSTALLED)  ## all results of the default configuration, under results/
 	$(VENV)/bin/snakemake --cores $(CORES)
@@ -14,13 +14,19 @@ reproduce: $(INSTALLED)  ## all results of the default configuration, under resu
 test: $(INSTALLED)  ## the tests
 	$(VENV)/bin/python -m pytest
 
-bench: $(INSTALLED)  ## speed of the engine beside other ways to the same results
+package: $(INSTALLED)  ## build the package, install it in a fresh environment and predict with it
+	$(VENV)/bin/python -m pytest -m packaging
+
+docs: $(INSTALLED)  ## the documentation as a site, under site/; a broken link is an error
+	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build --strict
+
+bench: $(INSTALLED)  ## speed of the convolution beside alternative implementations
 	$(VENV)/bin/scenenet bench
 
-pictures: $(INSTALLED)  ## docs/images anew from the results of make reproduce; needs Chromium
-	$(VENV)/bin/python docs/pictures.py
+pictures: $(INSTALLED)  ## take docs/images again from the results of make reproduce; needs Chromium
+	$(VENV)/bin/python tools/doc_pictures.py
 
-lint: $(INSTALLED)  ## style, types, formatting
+lint: $(INSTALLED)  ## style, types, formatting, order of the packages
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
@@ -28,7 +34,7 @@ lint: $(INSTALLED)  ## style, types, formatting
 	$(VENV)/bin/snakefmt --check Snakefile workflow
 
 clean:  ## remove what Python and the tools leave behind; results stay
-	rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .pytest_cache .mypy_cache .ruff_cache .hypothesis site build
 	find scenenet workflow tests -name __pycache__ -prune -exec rm -rf {} +
 
 help:  ## this list

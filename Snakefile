@@ -1,4 +1,4 @@
-"""From surveys to trained models, tower maps and a report; see docs/design.md for the way."""
+"""From surveys to trained models, tower maps and a report; see docs/development/architecture.md for the way."""
 
 from snakemake.utils import min_version
 

@@ -1,8 +1,7 @@
-"""SCENE-Net: power-line towers in LiDAR point clouds from 11 parameters with a meaning.
+"""SCENE-Net: power-line towers in LiDAR point clouds, from 11 interpretable parameters.
 
-The package follows the way of the data: ``pointcloud`` -> ``towers`` -> ``crops`` -> ``voxels`` ->
-``split`` -> ``training`` -> ``tuning`` -> ``evaluation`` -> ``inference`` -> ``report``.
-A module imports only what comes before it; ``docs/design.md`` has the list and the reasons.
+``docs/development/architecture.md`` lists the packages in their order; each imports only packages
+before it.
 """
 
 import os

@@ -59,8 +59,8 @@ def project_root() -> Path:
 
 @pytest.fixture(scope="session")
 def pictures() -> ModuleType:
-    """``docs/pictures.py``, which opens pages as a reader has them; skips without Chromium."""
-    spec = importlib.util.spec_from_file_location("pictures", ROOT / "docs" / "pictures.py")
+    """``tools/doc_pictures.py``, which opens pages as a reader has them; skips without Chromium."""
+    spec = importlib.util.spec_from_file_location("pictures", ROOT / "tools" / "doc_pictures.py")
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     if module.chromium() is None:

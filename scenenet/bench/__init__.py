@@ -1,6 +1,6 @@
 """How fast the engine is, beside what else there is for the same work.
 
-``scenenet bench`` runs it; ``docs/performance.md`` tells what was measured and why it is so.
+``scenenet bench`` runs it; ``docs/method/performance.md`` tells what was measured and why it is so.
 
 - ``crops``: what is measured on.
 - ``peers``: the other ways to the same result.

@@ -21,16 +21,17 @@ from scenenet.models.settings import ModelSettings
 HEAD = """\
 # Settings
 
-`config.yaml` is read on every run; a file given with `--configfile` is laid over it: mappings are
-merged key by key, lists are replaced. `--config KEY=VALUE` comes last. A setting that is written
-nowhere has the default below. `RESULTS_DIR/config.yaml` has all settings of a run.
+`config.yaml` is read on every run. A file given with `--configfile` is laid over it: mappings are
+merged key by key, lists are replaced. `--config KEY=VALUE` is applied last. A setting that is not
+given has the default below. `RESULTS_DIR/config.yaml` has all settings of a run.
 
 | file | what it is for |
 |---|---|
 | `config.yaml` | the full reproduction, on synthetic surveys |
-| `test.yaml` | the same chain in minutes |
+| `test.yaml` | the same stages in minutes |
 | `ts40k.yaml` | real samples of TS40K: `--config ts40k_dir=FOLDER` |
-| `surveys.tsv` | the survey sheet, see `docs/surveys.md` |
+| `studies.yaml` | the studies of the thesis; see `docs/guides/studies.md` |
+| `surveys.tsv` | the survey sheet; see `docs/guides/surveys.md` |
 | `thesis.yaml` | published numbers |
 
 This page is written by `python -m scenenet.config.reference --reference config/README.md`.

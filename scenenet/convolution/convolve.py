@@ -7,7 +7,7 @@ voxel adds the kernel, mirrored about its anchor, to the output around it. That 
     out[p] = sum_q kernel[q] * x[p + q - a],   a = (k - 1) // 2 on each axis
 
 with x = 0 outside the grid. An even kernel reaches one voxel further up each axis than down.
-``docs/performance.md`` tells how fast it is and why. A kernel on a GPU is convolved there, densely.
+``docs/method/performance.md`` explains its speed. A kernel on a GPU is convolved there, densely.
 """
 
 from __future__ import annotations

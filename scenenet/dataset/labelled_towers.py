@@ -73,7 +73,7 @@ def cluster(xyz: np.ndarray, settings: TowerSettings) -> np.ndarray:
     """DBSCAN instance of each point (N, 3): (N,) int from 0, -1 for noise.
 
     DBSCAN's memory grows with the square of the points a tower has, so it is given one weighted
-    point a cell; the clusters are the same (docs/design.md).
+    point a cell; the clusters are the same (docs/development/architecture.md).
     """
     if len(xyz) == 0:
         return np.empty(0, int)

@@ -1,4 +1,4 @@
-"""From voxels that look like a tower to towers (thesis 5.1.2, last paragraph; docs/towers.md).
+"""From detected voxels to towers (thesis 5.1.2, last paragraph; docs/method/detection.md).
 
 The model says where to look: an axis is put where detected voxels stand above one another. What
 stands there is then measured in the occupied voxels, detected or not, so that a tower does not

@@ -1,4 +1,7 @@
-"""Scores of a model on crops: voxels and towers (thesis 5.2.4; docs/design.md, Definitions)."""
+"""Scores of a model on crops: voxels and towers (thesis 5.2.4).
+
+The scores are defined in docs/development/architecture.md.
+"""
 
 from __future__ import annotations
 
@@ -65,7 +68,7 @@ def score_answers(
 
     Voxel scores come from the counts of all samples together, and all voxels of the grids count,
     empty ones included. ``voxel_observer`` counts the voxels that reach tau, ``voxel_towers`` those
-    of the towers found, body and all (docs/towers.md), and ``voxel`` is one of the two.
+    of the towers found, body and all (docs/method/detection.md), and ``voxel`` is one of the two.
     ``voxel_occupied`` is ``voxel`` over the occupied voxels alone, ``voxel_trivial`` the model that
     never says tower, and ``alive`` says whether any tower voxel reaches tau.
 

@@ -1,7 +1,7 @@
 """SCENE-Net, the CNN and the black box, trained on the same crops and scored on the same others.
 
-Each chooses tau in its own way (docs/accuracy.md): a SCENE-Net in metres on the crops it learnt
-from as well, the black box never on those.
+Each chooses tau in its own way (docs/method/baselines.md): a SCENE-Net in metres on its training
+crops as well, the boosted trees never on those.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class TunedModel:
     def score_towers(
         self, samples: Iterable[VoxelSample], detection: DetectionSettings
     ) -> Confusion:
-        """The same of the voxels of whole towers that are found (docs/towers.md)."""
+        """The same of the voxels of whole towers that are found (docs/method/detection.md)."""
         total = Confusion()
         for sample in samples:
             probability, truth = self.answer(sample)

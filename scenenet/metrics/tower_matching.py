@@ -41,7 +41,7 @@ class TowerMatch:
 
 
 HIT_DISTANCE_M = 5.0
-"""A predicted tower this near (xy) to a true one is a hit (docs/design.md)."""
+"""A predicted tower this near (xy) to a true one is a hit (docs/development/architecture.md)."""
 
 
 def match_towers(

@@ -1,4 +1,4 @@
-"""Scores of voxels and of towers (thesis 5.2.4.1; docs/design.md, Definitions)."""
+"""Scores of voxels (thesis 5.2.4.1), as docs/development/architecture.md defines them."""
 
 from __future__ import annotations
 

@@ -26,7 +26,8 @@ OF_RANGES: tuple[Init, ...] = ("unranged", "handcrafted")
 
 
 class MetricSettings(Settings):
-    """A SCENE-Net in metres. None of these is trained; each has a reason (docs/accuracy.md)."""
+    """A SCENE-Net in metres. None of these is trained; docs/method/operational_protocol.md gives
+    the reason of each."""
 
     radius: float = Field(3.0, gt=0, description="m, how far the kernels reach in plan")
     above: float = Field(6.0, ge=0, description="m, how far they reach up")
@@ -49,7 +50,7 @@ class MetricSettings(Settings):
     whole_towers: bool = Field(
         True,
         description="a voxel is called a tower's where it belongs to a tower that is found, body "
-        "and all (docs/towers.md); false for where it reaches tau, as in the thesis",
+        "and all (docs/method/detection.md); false for where it reaches tau, as in the thesis",
     )
 
 
@@ -122,7 +123,8 @@ class ModelSettings(Settings):
     protocol: Protocol = Field(
         "thesis",
         description="thesis: kernels in voxels, trained by gradient (thesis 5.2.1); field: a "
-        "SCENE-Net in metres, searched for, for use on real surveys (docs/accuracy.md)",
+        "SCENE-Net in metres, searched for, for use on real surveys "
+        "(docs/method/operational_protocol.md)",
     )
     field: MetricSettings = MetricSettings()
     search: SearchSettings = SearchSettings()

@@ -57,8 +57,8 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
     (those that detect anything; only where some do not) and the one that is best on validation,
     which is the one that predicts. The thesis counts useful trainings only (5.2.6). The black box
     (``scenenet.baselines.boosted_trees``) was trained, tuned and scored on the same crops.
-    ``voxels`` says which
-    the model calls a tower's: those that reach tau, or those of whole towers (docs/towers.md).
+    ``voxels`` says which the model calls a tower's: those that reach tau, or those of whole towers
+    (docs/method/detection.md).
     """
     import pandas as pd
 
@@ -101,7 +101,8 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
 
 def whole_towers(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
     """Scores of the voxels that reach tau beside those of whole towers that are found with them
-    (docs/towers.md): a row per model, mean and spread over all seeds, the black box among them."""
+    (docs/method/detection.md): a row per model, mean and spread over all seeds, boosted trees
+    included."""
     import pandas as pd
 
     parts = {"tau": "voxel_observer", "towers": "voxel_towers"}

@@ -30,7 +30,7 @@ TOLERANCE = 0.2
 REMARKS: Mapping[str, str] = {
     "data.": "These are the data of the thesis; ours are named in the section on the surveys.",
     "class_share.": "The shares are those of other land, and labels of crops are coded otherwise "
-    "than Table 5.1 says (docs/synthetic.md).",
+    "than Table 5.1 says (docs/method/synthetic.md).",
     "towers.": "The lines are others: the public crops show poles of 10-20 m, the thesis' "
     "statistics pylons.",
     "voxelisation.": "Time on the machine this ran on; counted without sorting.",

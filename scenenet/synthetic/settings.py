@@ -23,7 +23,7 @@ class SyntheticSettings(Settings):
     """One corridor survey (thesis section 5.1): what stands in it and how it is scanned.
 
     The defaults make a medium-voltage line of poles like those of the public TS40K crops; a line of
-    transmission pylons as thesis 5.1.2 tells it takes the settings of docs/synthetic.md.
+    transmission pylons as thesis 5.1.2 tells it takes the settings of docs/method/synthetic.md.
     """
 
     towers: int = Field(14, ge=1, le=1_000_000, description="number of towers of the line")

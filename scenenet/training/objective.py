@@ -1,4 +1,4 @@
-"""The numbers of a SCENE-Net in metres, found without a gradient (docs/accuracy.md).
+"""The numbers of a SCENE-Net in metres, found without a gradient (docs/method/accuracy.md).
 
 Eleven numbers need no gradient, and the one of the thesis' loss is the reason for dead starts:
 where the observer is negative, ReLU lets none through. Here whole sets of numbers are drawn, scored

@@ -1,4 +1,4 @@
-"""What runs again after a change, and what does not (docs/reruns.md)."""
+"""What runs again after a change, and what does not (docs/development/reruns.md)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """The compiled loops below the convolution: runs of voxels, planes of output, vector rows.
 
 Nothing outside this package and its users, ``convolution``, ``observer`` and ``voxels``, needs to
-know how the sum is organised; ``docs/performance.md`` says why it is organised like this.
+know how the sum is organised; ``docs/method/performance.md`` says why it is organised like this.
 
 - ``runs``: occupied voxels, gathered four by four along x.
 - ``tables``: the kernel, laid out for every pattern of four voxels; and back, for its gradient.

@@ -1,7 +1,7 @@
 """Every crop is a test crop once: what a split of a handful of crops cannot tell.
 
 tau is chosen on the training crops of the fold, and nothing is chosen on those left out
-(docs/accuracy.md).
+(docs/method/accuracy.md).
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
     python -m scenenet.experiments.domain_gap.compare_crops --real FOLDER_OF_TS40K_SAMPLES --towers
     100
 
-prints the tables of docs/synthetic.md. The synthetic crops come through the same chain as those of
-a survey: LAZ file, towers, crops.
+prints the tables of docs/method/synthetic.md. The synthetic crops come through the same chain as
+those of a survey: LAZ file, towers, crops.
 """
 
 from __future__ import annotations

@@ -2,7 +2,8 @@
 
 The numbers say how alike two sets of crops are, real and synthetic ones above all. They follow from
 the points and their EDP codes alone, in the way in which the public TS40K crops are coded (see
-docs/synthetic.md): ground in 2, 10 and 19, low vegetation in 11, whatever is taller in 5 and 12.
+docs/method/synthetic.md): ground in 2, 10 and 19, low vegetation in 11, whatever is taller in 5
+and 12.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 trains SCENE-Net and the black box on synthetic crops alone and scores them on real ones, beside the
 same models trained on real crops with two left out at a time. Prints the table of
-docs/synthetic.md.
+docs/method/synthetic.md.
 """
 
 from __future__ import annotations

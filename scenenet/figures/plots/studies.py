@@ -52,8 +52,7 @@ def heat_map(
 
     Args:
         summary: of ``scenenet.experiments.studies.summary``, one row per combination, the second
-        varying
-            fastest.
+            setting varying fastest.
         names: of the two settings.
         shape: how many values each has.
         out: PNG to write.

@@ -16,7 +16,7 @@ KINDS = {"ground": "#A98B6D", "low": "#A6C36F", "tall": "#2F7D4F", "stray": "#CC
 
 EDP_KINDS = {2: "ground", 10: "ground", 19: "ground", 9: "ground", 3: "low", 4: "low", 11: "low",
              5: "tall", 12: "tall", 7: "stray", 16: "wire", 17: "wire", 15: "tower"}  # fmt: skip
-"""EDP codes as the public TS40K crops use them (docs/synthetic.md)."""
+"""EDP codes as the public TS40K crops use them (docs/method/synthetic.md)."""
 
 
 def crops_beside(crops: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | Path) -> str:

@@ -34,7 +34,7 @@ def cross_validation(material: Material) -> Section | None:
         f"chosen on the others. Mean over the folds ± standard deviation of it over {seeds} seeds; "
         "pooled: from the counts of all folds together. A voxel is a tower's where it reaches tau; "
         "in the rows of whole towers, where it belongs to a tower that is found, body and all, by "
-        "the same rules for every model (docs/towers.md)."
+        "the same rules for every model (docs/method/detection.md)."
     )
     text = (
         f"The main result: {crops} crops are few, so each of them is a test crop once and no score "

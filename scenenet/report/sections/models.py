@@ -62,8 +62,9 @@ def _whole_towers(material: Material) -> list[Block]:
     caption = (
         "The same test crops and the same answers, counted in two ways: voxels that reach tau, and "
         "voxels of whole towers, body and all, where height, body and wires say that it is one. "
-        "The rules are the same for every model and nothing in them is trained (docs/towers.md). "
-        "Mean ± standard deviation over seeds. The thesis counts voxels that reach tau."
+        "The rules are the same for every model and nothing in them is trained "
+        "(docs/method/detection.md). Mean ± standard deviation over seeds. The thesis counts "
+        "voxels that reach tau."
     )
     return [table(frame, columns, caption, "tables/whole_towers.csv")]
 

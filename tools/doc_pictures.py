@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mlflow.entities import Run
     from playwright.sync_api import Page
 
-IMAGES = Path(__file__).parent / "images"
+IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 WIDTH = 1200
 COLOURS = 128
 """In the palette; text and charts need no more, and the files are a third of their size."""

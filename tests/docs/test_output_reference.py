@@ -1,0 +1,38 @@
+"""The parts of ``docs/reference/output.md`` that the small run of the tests does not write."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from fixtures.output_reference import Described, described
+
+from scenenet.experiments.cross_validation.run import COLUMNS
+from scenenet.experiments.cross_validation.summary import summarise_folds
+
+
+@pytest.fixture(scope="module")
+def page(project_root: Path) -> dict[str, Described]:
+    return {d.heading: d for d in described(project_root / "docs" / "reference" / "output.md")}
+
+
+def test_the_runs_of_a_cross_validation_are_described(page):
+    kind = page["cross_validation/MODEL.csv"]
+    assert kind.lacks(COLUMNS) == set()
+    assert kind.invents(COLUMNS) == set()
+
+
+def test_the_table_of_a_cross_validation_is_described(page):
+    row = dict.fromkeys(COLUMNS, 1) | {"model": "a", "crops": "one two", "alive": True}
+    if "voxels" in row:
+        row["voxels"] = "whole towers"
+    table = summarise_folds(pd.DataFrame([row, row | {"seed": 2}]))
+    kind = page["tables/cross_validation.csv"]
+    assert kind.lacks(table.columns) == set()
+    assert kind.invents(table.columns) == set()
+
+
+def test_a_missing_column_would_be_noticed(page):
+    assert page["tables/models.csv"].lacks(["model", "f05_std", "thesis_miou", "f1"]) == {"f1"}
+    assert page["tables/models.csv"].invents(["model"]) >= {"f05", "miou"}

@@ -98,7 +98,7 @@ def origin_tags(provenance: Mapping[str, Any]) -> dict[str, str]:
     if not provenance:
         return {}
     return {
-        "scenenet.config.schema": str(provenance.get("config", "")),
+        "scenenet.config": str(provenance.get("config", "")),
         "scenenet.data": digest(provenance.get("inputs", {})),
         "scenenet.code": str(provenance.get("code", "")),
         "scenenet.version": str(provenance.get("version", "")),

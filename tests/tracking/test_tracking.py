@@ -98,7 +98,7 @@ def test_a_training_is_a_run_with_all_that_is_known_of_it(settings, client, resu
     tags = run.data.tags
     assert (tags["model"], tags["seed"], tags["alive"]) == ("scenenet", "1", "true")
     assert tags["protocol"] == "20/10/70 by stretch"
-    assert (tags["scenenet.config.schema"], tags["scenenet.code"]) == ("c0f19", "c0de")
+    assert (tags["scenenet.config"], tags["scenenet.code"]) == ("c0f19", "c0de")
     assert tags["scenenet.data"]
 
 

@@ -121,10 +121,10 @@ def train(
     protocol: Annotated[
         TrainedBy,
         typer.Option(
-            help="field: a SCENE-Net in metres, searched for, and a CNN that begins at the data; "
-            "thesis: by gradient from a random start."
+            help="operational: a SCENE-Net in metres, fitted by a search, or a CNN that starts "
+            "from Fisher's discriminant; thesis: by gradient from a random start."
         ),
-    ] = TrainedBy.field,
+    ] = TrainedBy.operational,
     seeds: Annotated[int, typer.Option(min=1, help="Models to train; the best is kept.")] = 5,
     epochs: Annotated[
         int, typer.Option(min=1, help="Passes over the crops, where training is by gradient.")
@@ -134,7 +134,7 @@ def train(
         typer.Option(
             min=1e-6,
             help="Step size of RMSProp, where training is by gradient; 0.01 if not given, and "
-            "0.001 for a CNN of protocol field, which larger steps lead away from its start.",
+            "0.001 for a CNN of protocol operational, which larger steps lead away from its start.",
         ),
     ] = None,
     resolution: Annotated[
@@ -146,7 +146,7 @@ def train(
             min=0,
             max=0.9,
             help="Share of the crops kept to tune on; 0.3 if not given, and none for a SCENE-Net "
-            "of protocol field, whose eleven numbers hardly know their crops by heart.",
+            "of protocol operational, whose eleven numbers hardly know their crops by heart.",
         ),
     ] = None,
     as_json: AsJson = False,
@@ -160,12 +160,13 @@ def train(
     ending = ".json" if kind is Kind.scenenet else ".safetensors"
     if out.suffix != ending:
         raise typer.BadParameter(f"a {kind} is kept in a {ending} file", param_hint="--out")
-    in_metres = kind is Kind.scenenet and protocol is TrainedBy.field
+    in_metres = kind is Kind.scenenet and protocol is TrainedBy.operational
     if validation is None:
         validation = 0.0 if in_metres else 0.3
     if learning_rate is None:
-        learning_rate = 0.001 if protocol is TrainedBy.field else 0.01
-    training = TrainingSettings(init=protocol.value, epochs=epochs, learning_rate=learning_rate)
+        learning_rate = 0.001 if protocol is TrainedBy.operational else 0.01
+    init = "informed" if protocol is TrainedBy.operational else "thesis"
+    training = TrainingSettings(init=init, epochs=epochs, learning_rate=learning_rate)
     settings = ModelSettings(
         name=kind.value, kind=kind.value, protocol=protocol.value, training=training
     )

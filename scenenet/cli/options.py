@@ -27,7 +27,7 @@ class Fit(StrEnum):
 class TrainedBy(StrEnum):
     """Protocols; see ``scenenet.models.settings``."""
 
-    field = "field"
+    operational = "operational"
     thesis = "thesis"
 
 

@@ -48,7 +48,7 @@ def score(
     def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         return probabilities(model, sample, card.measurement)
 
-    whole = isinstance(model, SceneNet) and model.field is not None and model.field.whole_towers
+    whole = isinstance(model, SceneNet) and model.metric is not None and model.metric.whole_towers
     return score_answers(
         card.name, seed, card.threshold(), answer, dataset, detection, whole_towers=whole
     )

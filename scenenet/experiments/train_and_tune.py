@@ -109,14 +109,14 @@ def train_model(
         print(error, file=sys.stderr)
         n, seconds = new_model(settings, seed).n_parameters(), time.perf_counter() - begin
         return TunedModel(_nothing, float(THRESHOLDS[-1]), 0.0, n, seconds)
-    if model.field is None:
+    if model.metric is None:
         curve = threshold_curve(model, validation or training, settings.measurement)
         tau, counts = curve.best()
     else:
         # As in ``scenenet.training.tuning``: eleven numbers hardly know their crops by heart.
         both = [*training, *validation]
         step, _ = best_step(
-            threshold_curve(model, both, settings.measurement), model.field.false_weight
+            threshold_curve(model, both, settings.measurement), model.metric.false_weight
         )
         curve = threshold_curve(model, validation or training, settings.measurement)
         tau, counts = float(curve.tau[step]), curve.confusion(step)

@@ -101,7 +101,7 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         said.append(
             f"at {resolution}³ precision {counts.precision:.2f} and recall {counts.recall:.2f}"
         )
-    trained_on = "in metres" if trained.field else "in voxels, as many on both grids"
+    trained_on = "in metres" if trained.metric else "in voxels, as many on both grids"
     return truth_and_answer(views, card.threshold(), out), (
         f"Crop {sample['id']}, the middle one of the test crops by F0.5 of {model}, on two grids: "
         f"what is labelled tower, what {model} (seed {champion.seed}) answers, and where that is "

@@ -73,7 +73,7 @@ def draw_kernels(results: Results, model: str, out: Path) -> tuple[str, str]:
     champion = champion_of(results, model)
     trained, _ = read_model(champion.model_files[0])
     start = start_of(champion, trained)
-    metres = trained.voxel_size if isinstance(trained, SceneNet) and trained.field else None
+    metres = trained.voxel_size if isinstance(trained, SceneNet) and trained.metric else None
     alt = kernels(_slices(trained), out, start and _slices(start.model), metres)
     before = "" if start is None else f"The rows above are those {start.said}. "
     figures = "As thesis Figures 4.2 to 4.4." if isinstance(trained, SceneNet) else ""

@@ -43,7 +43,7 @@ def parameters_of(model: SceneNet, voxel_size: float) -> list[Parameter]:
     found = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         for parameter in kernel_named(geneo).parameters:
-            factor = _metres(parameter, voxel_size) if model.field is None else 1.0
+            factor = _metres(parameter, voxel_size) if model.metric is None else 1.0
             label = f"{name}.{parameter.name}"
             found.append(Parameter(label, parameter.name, parameter.metric_unit, factor))
     return found + [Parameter(f"lambda.{name}", "lambda", "1", 1.0) for name in model.names]

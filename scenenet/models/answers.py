@@ -27,7 +27,7 @@ def threshold_curve(
     model: VoxelModel, samples: Sequence[VoxelSample], measurement: Measurement
 ) -> ThresholdCurve:
     """Scores at every tau over all voxels of ``samples``, empty ones included."""
-    if isinstance(model, SceneNet) and model.field is not None:
+    if isinstance(model, SceneNet) and model.metric is not None:
         return curve_of(model, scenes_of(model, samples, measurement))
     total = ThresholdCurve.empty()
     with torch.no_grad():
@@ -42,7 +42,7 @@ def probabilities(
     model: VoxelModel, sample: VoxelSample, measurement: Measurement
 ) -> tuple[np.ndarray, np.ndarray]:
     """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid."""
-    if isinstance(model, SceneNet) and model.field is not None:
+    if isinstance(model, SceneNet) and model.metric is not None:
         (scene,) = scenes_of(model, [sample], measurement)
         with torch.no_grad():
             return sample.spread(answers(model, scene))

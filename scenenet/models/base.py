@@ -19,12 +19,12 @@ class VoxelModel(nn.Module):
     Attributes:
         kind: name of the architecture in model files and tables.
         kernel_size: (kz, ky, kx) in voxels.
-        field: lengths of a model in metres; None where kernels are in voxels.
+        metric: lengths of a model in metres; None where kernels are in voxels.
     """
 
     kind: str
     kernel_size: KernelSize
-    field: MetricSettings | None = None
+    metric: MetricSettings | None = None
 
     def at(self, voxel_size: float) -> Self:
         """The model for voxels of ``voxel_size`` m, sharing its numbers; itself where its kernels

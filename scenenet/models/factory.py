@@ -15,5 +15,5 @@ def new_model(settings: ModelSettings, seed: int) -> VoxelModel:
     generator = torch.Generator().manual_seed(seed)
     if settings.kind == "cnn":
         return CNN(settings.n_kernels, settings.kernel_size, generator=generator)
-    field = settings.field if settings.protocol == "field" else None
-    return SceneNet(settings.geneos, settings.kernel_size, field=field, generator=generator)
+    metric = settings.metric if settings.protocol == "operational" else None
+    return SceneNet(settings.geneos, settings.kernel_size, metric=metric, generator=generator)

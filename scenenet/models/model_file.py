@@ -21,8 +21,10 @@ from scenenet.models.settings import KernelSize, MetricSettings
 
 FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
-METRIC_VERSION = 2
-"""Of a SCENE-Net in metres, which versions that know of none cannot read."""
+METRIC_VERSION = 3
+"""Of a SCENE-Net in metres, which versions without metric kernels cannot read."""
+FIELD_VERSION = 2
+"""The same as version 0.1 of this package wrote it: the lengths are called ``field`` there."""
 
 
 class ModelCard(Settings):
@@ -68,7 +70,7 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
     model = model.at(card.voxel_size)
     head = {
         "format": FORMAT,
-        "format_version": FORMAT_VERSION if model.field is None else METRIC_VERSION,
+        "format_version": FORMAT_VERSION if model.metric is None else METRIC_VERSION,
         "kind": model.kind,
         "kernel_size": list(model.kernel_size),
         **card.model_dump(),
@@ -111,7 +113,7 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
 def _numbers(model: SceneNet) -> dict[str, Any]:
     """The parameters of a SCENE-Net as a person would write them down."""
     values = model.shape_parameters()
-    metric = model.field is not None
+    metric = model.metric is not None
     geneos = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         parameters = {
@@ -125,17 +127,17 @@ def _numbers(model: SceneNet) -> dict[str, Any]:
         geneos.append({"name": name, "kernel": geneo, "parameters": parameters})
     mixing = {name: values[f"lambda.{name}"] for name in model.names}
     numbers = {"units": "voxel", "geneos": geneos, "mixing_weights": mixing}
-    if model.field is None:
+    if model.metric is None:
         return numbers
-    return numbers | {"units": "m", "field": model.field.model_dump()}
+    return numbers | {"units": "m", "metric": model.metric.model_dump()}
 
 
 def _read_scenenet(data: Mapping[str, Any]) -> tuple[SceneNet, ModelCard]:
     _check_head(data)
     geneos = [entry["kernel"] for entry in data["geneos"]]
-    metric = data["format_version"] == METRIC_VERSION
-    field = MetricSettings(**data["field"]) if metric else None
-    model = SceneNet(geneos, _size(data), field=field)
+    key = {METRIC_VERSION: "metric", FIELD_VERSION: "field"}.get(data["format_version"])
+    metric = None if key is None else MetricSettings(**data[key])
+    model = SceneNet(geneos, _size(data), metric=metric)
     numbers = {
         f"{entry['name']}.{symbol}": float(parameter["value"])
         for entry in data["geneos"]
@@ -168,10 +170,11 @@ def _check_head(data: Mapping[str, Any]) -> None:
         raise InputError(
             "not a model file of scenenet", remedy="Name a file that scenenet train has written"
         )
-    if data["format_version"] not in (FORMAT_VERSION, METRIC_VERSION):
+    readable = (FORMAT_VERSION, FIELD_VERSION, METRIC_VERSION)
+    if data["format_version"] not in readable:
         raise InputError(
             f"model format {data['format_version']}, this version reads "
-            f"{FORMAT_VERSION} and {METRIC_VERSION}",
+            f"{', '.join(map(str, readable))}",
             remedy="Use the version of scenenet that wrote it, or train it again",
         )
 

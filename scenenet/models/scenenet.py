@@ -31,7 +31,7 @@ class SceneNet(VoxelModel):
     With a cylinder, an arrow and a negative sphere it has eleven trained numbers: nine shape
     parameters and two mixing weights; the third is one minus the others.
 
-    Its kernels are in voxels as in the thesis, or, with ``field``, in metres. Then
+    Its kernels are in voxels as in the thesis, or, with ``metric``, in metres. Then
 
     - they are sampled at the voxel size of the grid (``at``), and H is weighted by it, so that a
       column of a tower that is occupied over so many metres has the same answer on every grid;
@@ -48,15 +48,15 @@ class SceneNet(VoxelModel):
         geneos: Sequence[str] = THESIS_GENEOS,
         kernel_size: KernelSize = (9, 9, 9),
         *,
-        field: MetricSettings | None = None,
+        metric: MetricSettings | None = None,
         generator: torch.Generator | None = None,
     ) -> None:
         """Draw the parameters at random from the ranges of the kernels (thesis 5.2.1).
 
         Args:
             geneos: names of kernels; a name may come more than once (thesis Table 5.5, F and G).
-            kernel_size: (kz, ky, kx) in voxels; follows from the lengths with ``field``.
-            field: lengths, for a model in metres; it begins at a voxel size of 1 m.
+            kernel_size: (kz, ky, kx) in voxels; follows from the lengths with ``metric``.
+            metric: lengths, for a model in metres; it begins at a voxel size of 1 m.
             generator: where the random numbers come from; torch's default if None.
 
         Raises:
@@ -66,7 +66,7 @@ class SceneNet(VoxelModel):
         if not geneos:
             raise InputError("a SCENE-Net needs at least one GENEO kernel")
         self.kernel_size = kernel_size
-        self.field = field
+        self.metric = metric
         self.voxel_size = 1.0
         self.geneos = list(geneos)
         self.names = _distinct(self.geneos)
@@ -75,7 +75,7 @@ class SceneNet(VoxelModel):
             shape = nn.ParameterDict()
             for parameter in kernel_named(geneo).parameters:
                 drawn = torch.rand((), generator=generator)
-                if field is None:
+                if metric is None:
                     drawn = parameter.low + (parameter.high - parameter.low) * drawn
                 else:
                     drawn = torch.logit(0.03 + 0.94 * drawn)
@@ -85,22 +85,22 @@ class SceneNet(VoxelModel):
         highest = 2 / max(1, len(self.names) - 1)
         for name in self.names[:-1]:
             drawn = torch.rand((), generator=generator)
-            drawn = highest * drawn if field is None else 6 * drawn - 3
+            drawn = highest * drawn if metric is None else 6 * drawn - 3
             self.mixing[name] = nn.Parameter(drawn)
-        if field is not None:
+        if metric is not None:
             self._discretise(1.0)
 
     def at(self, voxel_size: float) -> Self:
-        if self.field is None or voxel_size == self.voxel_size:
+        if self.metric is None or voxel_size == self.voxel_size:
             return self
         other = copy.copy(self)  # shallow: the numbers are the same objects
         other._discretise(voxel_size)
         return other
 
     def _discretise(self, voxel_size: float) -> None:
-        assert self.field is not None
-        up, down = (whole_voxels(m, voxel_size) for m in (self.field.above, self.field.below))
-        wide = 2 * whole_voxels(self.field.radius, voxel_size) + 1
+        assert self.metric is not None
+        up, down = (whole_voxels(m, voxel_size) for m in (self.metric.above, self.metric.below))
+        wide = 2 * whole_voxels(self.metric.radius, voxel_size) + 1
         # Centred on the voxel that it answers for, so as tall as the longer side; the other ends
         # earlier (``kernels``).
         self.kernel_size = (2 * max(up, down) + 1, wide, wide)
@@ -109,21 +109,21 @@ class SceneNet(VoxelModel):
     @property
     def reach(self) -> tuple[int, int, int]:
         z, y, x = super().reach
-        if self.field is None:
+        if self.metric is None:
             return z, y, x
-        wide = whole_voxels(self.field.section_radius, self.voxel_size)
-        high = whole_voxels(self.field.section_above, self.voxel_size)
+        wide = whole_voxels(self.metric.section_radius, self.voxel_size)
+        high = whole_voxels(self.metric.section_above, self.voxel_size)
         return z + high, y + wide, x + wide
 
     def section(self, occupancy: Occupancy) -> tuple[np.ndarray, np.ndarray]:
         """The occupied voxels in each one's section
         (``scenenet.convolution.cross_section.neighbours``)."""
-        assert self.field is not None
-        lengths = self.field.section_radius, self.field.section_above
+        assert self.metric is not None
+        lengths = self.metric.section_radius, self.metric.section_above
         return neighbours(occupancy, section_offsets(*lengths, self.voxel_size))
 
     def argmax_rows(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
-        if self.field is None:
+        if self.metric is None:
             return super().argmax_rows(occupancy, observed)
         return strongest(observed.detach().numpy(), *self.section(occupancy))
 
@@ -132,7 +132,7 @@ class SceneNet(VoxelModel):
 
         In metres, that of an empty voxel is 0 and there is no gradient.
         """
-        if self.field is None:
+        if self.metric is None:
             return super().forward(occupancy)
         kernel, _ = self.observer()
         observed = convolve_at_voxels(occupancy, kernel.detach().cpu()[None])[0]
@@ -144,7 +144,7 @@ class SceneNet(VoxelModel):
     def shape_of(self, name: str) -> dict[str, Tensor]:
         """Shape parameters of the GENEO called ``name``, by their symbol."""
         numbers = dict(cast(nn.ParameterDict, self.shapes[name]).items())
-        if self.field is None:
+        if self.metric is None:
             return numbers
         ranges = {p.name: p.metric_range for p in self._parameters_of(name)}
         return {
@@ -158,7 +158,7 @@ class SceneNet(VoxelModel):
     def mixing_weights(self) -> Tensor:
         """lambda, (K,), summing to one: the last is 1 minus the others (thesis 4.5)."""
         free = [self.mixing[name] for name in self.names[:-1]]
-        if self.field is not None:
+        if self.metric is not None:
             return torch.softmax(torch.stack([*free, torch.zeros(())]), dim=0)
         last = torch.ones(()) - sum(free, torch.zeros(()))
         return torch.stack([*free, last])
@@ -166,11 +166,11 @@ class SceneNet(VoxelModel):
     def kernels(self) -> Tensor:
         """The sampled kernels, (K, kz, ky, kx), before mixing."""
         device = next(self.parameters()).device
-        if self.field is None:
+        if self.metric is None:
             lattice = Lattice.of_size(self.kernel_size, device=device)
         else:
             lattice = Lattice.of_extent(
-                self.kernel_size, self.field.radius, self.voxel_size, device=device
+                self.kernel_size, self.metric.radius, self.voxel_size, device=device
             )
         sampled = torch.stack(
             [
@@ -178,10 +178,10 @@ class SceneNet(VoxelModel):
                 for name, geneo in zip(self.names, self.geneos, strict=True)
             ]
         )
-        if self.field is None or lattice.inside is None:
+        if self.metric is None or lattice.inside is None:
             return sampled
-        ends = (lattice.z >= -self.field.below * (1 + 1e-6)) & (
-            lattice.z <= self.field.above * (1 + 1e-6)
+        ends = (lattice.z >= -self.metric.below * (1 + 1e-6)) & (
+            lattice.z <= self.metric.above * (1 + 1e-6)
         )
         return sampled * lattice.inside * ends * (self.voxel_size / COLUMN_M)
 
@@ -223,7 +223,7 @@ class SceneNet(VoxelModel):
         total = sum(numbers[f"lambda.{name}"] for name in self.names)
         if abs(total - 1) > 1e-4:
             raise InputError(f"mixing weights sum to {total:.6f}, not to 1")
-        if self.field is not None:
+        if self.metric is not None:
             self._set_logits(numbers)
             return
         with torch.no_grad():
@@ -267,7 +267,7 @@ class SceneNet(VoxelModel):
         Raises:
             InputError: the kernels are in metres.
         """
-        if self.field is not None:
+        if self.metric is not None:
             raise InputError(
                 "the kernels of this SCENE-Net are in metres, and the grid sets their voxels",
                 remedy="Take a model of protocol thesis for other kernel sizes",

@@ -5,7 +5,8 @@ They stand by themselves because reading the configuration must not load torch.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -19,8 +20,8 @@ BOOSTED_TREES = "black box"
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
 
 
-Protocol = Literal["thesis", "field"]
-Init = Literal["thesis", "field", "unranged", "handcrafted"]
+Protocol = Literal["thesis", "operational"]
+Init = Literal["thesis", "informed", "unranged", "handcrafted"]
 OF_RANGES: tuple[Init, ...] = ("unranged", "handcrafted")
 """Starts that say something of ranges, which a CNN does not have."""
 
@@ -92,8 +93,8 @@ class TrainingSettings(Settings):
 
     init: Init = Field(
         "thesis",
-        description="thesis: numbers drawn once; field: the best of many draws on the training "
-        "crops, and for a CNN what tells the surroundings of tower voxels from those of others; "
+        description="thesis: numbers drawn once; informed: the best of many draws on the training "
+        "crops, and for a CNN Fisher's discriminant of tower voxels' surroundings and others'; "
         "for a SCENE-Net also (thesis 5.3.4) unranged: drawn from N(0, 1), ranges or not, and "
         "handcrafted: the values that stand beside each kernel, the same for every seed",
     )
@@ -110,6 +111,13 @@ class TrainingSettings(Settings):
     )
     loss: LossSettings = LossSettings()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _old_names(cls, raw: Any) -> Any:
+        if isinstance(raw, Mapping) and raw.get("init") == "field":
+            raise ValueError("init 'field' is now called 'informed'; write init: informed")
+        return raw
+
     def rate(self, epoch: int) -> float:
         """The learning rate of an epoch, counted from 1."""
         return self.learning_rate * (1 - self.decay) ** ((epoch - 1) // self.decay_every)
@@ -122,11 +130,11 @@ class ModelSettings(Settings):
     kind: Literal["scenenet", "cnn"] = Field(description="architecture")
     protocol: Protocol = Field(
         "thesis",
-        description="thesis: kernels in voxels, trained by gradient (thesis 5.2.1); field: a "
-        "SCENE-Net in metres, searched for, for use on real surveys "
+        description="thesis: kernels in voxels, trained by gradient (thesis 5.2.1); operational: "
+        "a SCENE-Net in metres, searched for, for use on real surveys "
         "(docs/method/operational_protocol.md)",
     )
-    field: MetricSettings = MetricSettings()
+    metric: MetricSettings = MetricSettings()
     search: SearchSettings = SearchSettings()
     geneos: tuple[str, ...] = Field(
         THESIS_GENEOS, min_length=1, description="kernels of a SCENE-Net; a name may be repeated"
@@ -135,6 +143,19 @@ class ModelSettings(Settings):
     kernel_size: KernelSize = Field((9, 9, 9), description="(kz, ky, kx) in voxels")
     measurement: Measurement = Field("presence", description="phi (thesis 4.2.2, 5.3.2)")
     training: TrainingSettings = TrainingSettings()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _old_names(cls, raw: Any) -> Any:
+        if not isinstance(raw, Mapping):
+            return raw
+        if raw.get("protocol") == "field":
+            raise ValueError(
+                "protocol 'field' is now called 'operational'; write protocol: operational"
+            )
+        if "field" in raw:
+            raise ValueError("the settings 'field' are now called 'metric'; write metric: instead")
+        return raw
 
     @model_validator(mode="after")
     def _start_fits(self) -> Self:

@@ -57,7 +57,7 @@ def predict_survey(
     tau = card.threshold()  # before the work: a model without one cannot say what a tower is
     geneos = trained.names if isinstance(trained, SceneNet) else []
     voxel_size = settings.voxel_size or card.voxel_size
-    if trained.field is not None:
+    if trained.metric is not None:
         voxel_size *= block_edge(voxel_size)
     name, crs = Path(path).name, survey_in_metres(path).crs
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:

@@ -68,5 +68,5 @@ def _settings(result: SeedResult) -> ModelSettings | None:
 
 
 def _like(trained: SceneNet, size: KernelSize) -> SceneNet:
-    other = type(trained)(trained.geneos, size, field=trained.field)
+    other = type(trained)(trained.geneos, size, metric=trained.metric)
     return other.at(trained.voxel_size)

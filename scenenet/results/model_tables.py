@@ -146,7 +146,7 @@ def numbers_in_metres(results: Results, model: str) -> Numbers | None:
             began.add(start.said)
     if network is None:
         return None
-    step = 1.0 if network.field is not None else sum(sizes) / len(sizes)
+    step = 1.0 if network.metric is not None else sum(sizes) / len(sizes)
     said = "; ".join(sorted(began))
     return Numbers(network, known, pd.DataFrame(after), pd.DataFrame(before), said, step)
 

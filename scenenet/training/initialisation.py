@@ -4,11 +4,12 @@
   and a CNN's as torch does (``scenenet.models.scenenet``).
 - ``unranged``: "not enforcing ranges" (5.3.4), every number of a SCENE-Net from N(0, 1).
 - ``handcrafted``: "handcrafted values" (5.3.4), the same for every seed.
-- ``field``: the data are looked at first.
+- ``informed``: the training crops choose it.
 
 A model is dead where its observer is negative at everything that matters: ReLU then answers zero,
 lets no gradient through, and training never moves (thesis 5.2.6: "only one in five trained CNNs
-returns non-zero predictions"). Both ways of ``field`` begin where towers are told from the rest.
+returns non-zero predictions"). Both ways of
+``informed`` begin where towers are distinguished from the rest.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def starting_model(
 ) -> VoxelModel:
     """A new model that begins as ``settings.training.init`` says."""
     init = settings.training.init
-    if init == "field":
+    if init == "informed":
         return informed_model(settings, seed, training)
     model = new_model(settings, seed)
     if isinstance(model, SceneNet) and init == "unranged":

@@ -1,4 +1,4 @@
-"""Training of protocol ``field``: the numbers of a SCENE-Net in metres are searched for."""
+"""Training of protocol ``operational``: the numbers of a SCENE-Net in metres are searched for."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def _row(
     row |= {"validation_loss": float("nan"), "validation_f05": float("nan")}
     if kept:
         curve = curve_of(model, kept)
-        row["validation_loss"] = 1 - best_step(curve, settings.field.false_weight)[1]
+        row["validation_loss"] = 1 - best_step(curve, settings.metric.false_weight)[1]
         row["validation_f05"] = curve.best()[1].f05
     return row | model.shape_parameters()
 

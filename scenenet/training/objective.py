@@ -53,8 +53,8 @@ def best_step(curve: ThresholdCurve, false_weight: float) -> tuple[int, float]:
 
 def scorer(model: SceneNet, scenes: Sequence[Scene]) -> Score:
     """The score of a set of numbers: the F0.5 of ``best_step`` at its own best tau."""
-    assert model.field is not None
-    false_weight = model.field.false_weight
+    assert model.metric is not None
+    false_weight = model.metric.false_weight
 
     def score(numbers: np.ndarray) -> float:
         model.set_numbers(numbers)

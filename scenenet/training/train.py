@@ -129,7 +129,7 @@ def fit(
             remedy="Set training.device to cpu, or install a torch that knows the GPU",
         )
     identity = _identity(training, validation, settings, seed)
-    if settings.protocol == "field" and settings.kind == "scenenet":
+    if settings.protocol == "operational" and settings.kind == "scenenet":
         return search_metric(training, validation, settings, seed, identity, checkpoint=checkpoint)
     model = starting_model(settings, seed, training).to(protocol.device)
     optimiser = OPTIMISERS[protocol.optimiser](model.parameters(), lr=protocol.learning_rate)

@@ -37,7 +37,7 @@ def tune(
     trained, card = read_model(model)
     samples = load(voxel_manifests, crops_in(split, "validation")).samples
     learnt: Sequence[VoxelSample] = ()
-    if trained.field is not None:
+    if trained.metric is not None:
         learnt = load(voxel_manifests, crops_in(split, "train")).samples
     tuned, card, result = choose(trained, card, samples, settings, learnt)
     write_model(out_model, tuned, card)
@@ -60,18 +60,18 @@ def choose(
             choose by. The scores are those of the validation part all the same.
     """
     candidates: list[VoxelModel] = [model]
-    field = model.field
-    if isinstance(model, SceneNet) and field is None:
+    metric = model.metric
+    if isinstance(model, SceneNet) and metric is None:
         sizes = [size for size in settings.kernel_sizes if size != model.kernel_size]
         candidates += [model.with_kernel_size(size) for size in sizes]
     tried = []
     for candidate in candidates:
         curve = threshold_curve(candidate, validation, card.measurement)
-        if field is None:
+        if metric is None:
             tau, counts = curve.best()
         else:
             both = curve + threshold_curve(candidate, learnt, card.measurement)
-            step, _ = best_step(both, field.false_weight)
+            step, _ = best_step(both, metric.false_weight)
             tau, counts = float(curve.tau[step]), curve.confusion(step)
         tried.append((counts.f05, tau, candidate, curve, counts))
     # The size it was trained with comes first and wins a tie.

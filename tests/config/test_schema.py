@@ -148,6 +148,19 @@ def test_reading_a_configuration_loads_nothing_heavy():
     assert shown.stdout.strip() == "[]"
 
 
+@pytest.mark.parametrize(
+    ("old", "key", "new"),
+    [
+        ({"protocol": "field"}, "models[0]", "write protocol: operational"),
+        ({"field": {"radius": 2.0}}, "models[0]", "write metric: instead"),
+        ({"training": {"init": "field"}}, "models[0].training", "write init: informed"),
+    ],
+)
+def test_a_setting_under_its_name_in_version_0_1_is_told_its_new_name(old, key, new):
+    text = complaint(models=[{"name": "m", "kind": "scenenet", **old}])
+    assert f"{key}: " in text and new in text
+
+
 @pytest.mark.parametrize("name", ["config.schema.json", "surveys.schema.json"])
 def test_the_schemas_are_those_of_the_models(project_root, name):
     remedy = "run: python -m scenenet.config.reference --schema workflow/schemas"

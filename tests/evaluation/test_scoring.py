@@ -218,7 +218,7 @@ def test_towers_are_found_in_voxels_finer_than_the_points_are_dense():
 @pytest.mark.parametrize("whole", [True, False])
 def test_a_model_in_metres_says_whole_towers_unless_it_is_told_not_to(whole):
     settings = ModelSettings(
-        name="m", kind="scenenet", protocol="field", field=MetricSettings(whole_towers=whole)
+        name="m", kind="scenenet", protocol="operational", metric=MetricSettings(whole_towers=whole)
     )
     result = score(new_model(settings, 0), CARD, Dataset([], [], "edp", []), LONE_POLES)
     assert result["whole_towers"] is whole

@@ -20,11 +20,11 @@ from scenenet.synthetic import SyntheticSettings, corridor_cloud
 from scenenet.training.train import fit
 from scenenet.training.tuning import choose
 
-QUICK = TrainingSettings(epochs=2, learning_rate=0.01, init="field")
+QUICK = TrainingSettings(epochs=2, learning_rate=0.01, init="informed")
 FIELD = ModelSettings(
     name="m",
     kind="scenenet",
-    protocol="field",
+    protocol="operational",
     search=SearchSettings(searches=1, trial=1, starts=8, population=6, generations=3),
 )
 MODELS = [
@@ -47,7 +47,7 @@ def crops():
     return samples
 
 
-@pytest.mark.parametrize("settings", MODELS, ids=["field", "thesis", "cnn"])
+@pytest.mark.parametrize("settings", MODELS, ids=["operational", "thesis", "cnn"])
 def test_with_validation_crops_a_model_is_tuned_as_in_the_workflow(crops, settings):
     rival = train_and_tune(settings, crops[:3], crops[3:4], 1)
     model, _ = fit(crops[:3], [], settings, 1)

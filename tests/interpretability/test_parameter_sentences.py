@@ -43,7 +43,7 @@ def test_kernels_in_voxels_are_brought_to_metres_and_those_in_metres_stay():
     assert in_voxels["arrow.beta"].factor == 1
     assert in_voxels["lambda.arrow"].factor == 1
     assert in_voxels["cylinder.sigma"].unit == "m^2"
-    in_metres = parameters_of(SceneNet(field=MetricSettings()), 0.5)
+    in_metres = parameters_of(SceneNet(metric=MetricSettings()), 0.5)
     assert {p.factor for p in in_metres} == {1.0}
     assert [p.name for p in in_metres] == list(SceneNet().shape_parameters())
 

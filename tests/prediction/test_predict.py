@@ -229,7 +229,7 @@ def test_the_voxel_size_can_be_set(survey, model, tmp_path):
 
 def test_a_model_in_metres_sees_fine_voxels_in_blocks(survey, model, tmp_path):
     _, card = read_model(model)
-    settings = ModelSettings(name="metric", kind="scenenet", protocol="field")
+    settings = ModelSettings(name="metric", kind="scenenet", protocol="operational")
     write_model(tmp_path / "metric.json", new_model(settings, 0), card)
     fine = predict(survey, tmp_path / "metric.json", tmp_path, voxel_size=0.3)
     assert fine.summary["voxel_size_m"] == pytest.approx(0.9)

@@ -44,7 +44,7 @@ def test_kernels_are_shown_at_the_size_that_was_chosen_later():
 
 
 def test_of_a_search_the_first_row_of_the_history_is_taken():
-    settings = ModelSettings(name="m", kind="scenenet", protocol="field")
+    settings = ModelSettings(name="m", kind="scenenet", protocol="operational")
     trained = new_model(settings, 3).at(0.5)
     assert isinstance(trained, SceneNet)
     first = trained.shape_parameters() | {"cylinder.r": 0.7}
@@ -59,7 +59,7 @@ def test_of_a_search_the_first_row_of_the_history_is_taken():
 
 
 def test_a_start_that_looked_at_the_data_is_not_drawn_again():
-    informed = TrainingSettings(init="field")
+    informed = TrainingSettings(init="informed")
     settings = ModelSettings(name="m", kind="scenenet", training=informed)
     assert start_of(result(settings), new_model(settings, 3)) is None
     cnn = ModelSettings(name="m", kind="cnn", training=informed)
@@ -67,5 +67,5 @@ def test_a_start_that_looked_at_the_data_is_not_drawn_again():
 
 
 def test_without_a_record_and_a_history_nothing_is_said():
-    model = SceneNet(field=MetricSettings())
+    model = SceneNet(metric=MetricSettings())
     assert start_of(SeedResult("m", "scenenet", 3, {}), model) is None

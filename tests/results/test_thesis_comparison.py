@@ -148,7 +148,7 @@ def test_settings_of_the_thesis_stand_beside_those_of_its_protocol(
 
 def test_the_thesis_is_compared_with_a_model_of_its_protocol(results: Results, thesis: Thesis):
     """One in metres may come first in the configuration."""
-    for model, protocol in (("scenenet", "field"), ("cnn", "thesis")):
+    for model, protocol in (("scenenet", "operational"), ("cnn", "thesis")):
         for seed in results.seeds:
             path = results.folder / "train" / model / f"seed-{seed}" / "provenance.json"
             told = json.loads(path.read_text()) | {"settings": {"protocol": protocol}}

@@ -23,7 +23,7 @@ def toys(scene):
     return [voxelise(c, VoxelGrid.metric(c.xyz, 1.0), f"toy-{i}") for i, c in enumerate(clouds)]
 
 
-def settings(kind: str, init: str = "field", epochs: int = 20) -> ModelSettings:
+def settings(kind: str, init: str = "informed", epochs: int = 20) -> ModelSettings:
     training = TrainingSettings(init=init, epochs=epochs, batch_size=2, learning_rate=0.01)
     return ModelSettings(name="m", kind=kind, kernel_size=(5, 5, 5), training=training)
 

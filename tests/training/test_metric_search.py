@@ -18,7 +18,7 @@ from scenenet.models.answers import probabilities, threshold_curve
 from scenenet.models.model_file import ModelCard, read_model, write_model
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings, ModelSettings, SearchSettings, TuningSettings
-from scenenet.training import metric_search as field
+from scenenet.training import metric_search
 from scenenet.training.train import fit
 from scenenet.training.tuning import choose
 
@@ -28,12 +28,12 @@ SMALL = MetricSettings(radius=2.0, above=3.0, below=3.0)
 def settings(generations: int = 6, **changes) -> ModelSettings:
     search = SearchSettings(searches=2, trial=2, starts=12, population=8, generations=generations)
     return ModelSettings(
-        name="m", kind="scenenet", protocol="field", field=SMALL, search=search, **changes
+        name="m", kind="scenenet", protocol="operational", metric=SMALL, search=search, **changes
     )
 
 
 def net(seed: int = 0, lengths: MetricSettings = SMALL) -> SceneNet:
-    return SceneNet(field=lengths, generator=torch.Generator().manual_seed(seed))
+    return SceneNet(metric=lengths, generator=torch.Generator().manual_seed(seed))
 
 
 @pytest.fixture(scope="module")
@@ -109,18 +109,18 @@ class PowerCut(Exception):
 
 def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
     straight, straight_history = fit(toys[:2], [], settings(5), 1)
-    original, done = field.advance, iter(range(2 * 2 + 1))  # trials and one more
+    original, done = metric_search.advance, iter(range(2 * 2 + 1))  # trials and one more
 
     def interrupted(*args):
         if next(done, None) is None:
             raise PowerCut
         return original(*args)
 
-    monkeypatch.setattr(field, "advance", interrupted)
+    monkeypatch.setattr(metric_search, "advance", interrupted)
     with pytest.raises(PowerCut):
         fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
     monkeypatch.undo()
-    monkeypatch.setattr(field, "begin", None)  # whoever begins anew fails
+    monkeypatch.setattr(metric_search, "begin", None)  # whoever begins anew fails
     resumed, history = fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
     assert resumed.numbers().tolist() == straight.numbers().tolist()
     pd.testing.assert_frame_equal(
@@ -201,14 +201,27 @@ def test_its_file_says_metres_and_reads_back(tmp_path):
     write_model(tmp_path / "m.json", model, card_for(model))
     written = json.loads((tmp_path / "m.json").read_text())
     assert written["units"] == "m"
-    assert written["format_version"] == 2
-    assert written["field"]["radius"] == 2.0
+    assert written["format_version"] == 3
+    assert written["metric"]["radius"] == 2.0
     radius, sigma = (written["geneos"][0]["parameters"][s] for s in ("r", "sigma"))
     assert (radius["unit"], sigma["unit"]) == ("m", "m^2")
     assert radius["value"] == pytest.approx(model.shape_parameters()["cylinder.r"])
     again, _ = read_model(tmp_path / "m.json")
-    assert again.field == SMALL
+    assert again.metric == SMALL
     assert again.voxel_size == 0.9
+    torch.testing.assert_close(again.observer()[0], model.at(0.9).observer()[0])
+
+
+def test_a_file_of_version_0_1_reads_back(tmp_path):
+    """It called the lengths ``field`` and had format version 2."""
+    model = net(5)
+    write_model(tmp_path / "m.json", model, card_for(model))
+    written = json.loads((tmp_path / "m.json").read_text())
+    old = written | {"format_version": 2, "field": written.pop("metric")}
+    (tmp_path / "old.json").write_text(json.dumps(old))
+    again, card = read_model(tmp_path / "old.json")
+    assert again.metric == SMALL
+    assert card == card_for(model)
     torch.testing.assert_close(again.observer()[0], model.at(0.9).observer()[0])
 
 

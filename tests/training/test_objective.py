@@ -18,7 +18,7 @@ from scenenet.training.objective import STEPS, best_step, draws
 
 
 def model(seed: int = 0) -> SceneNet:
-    return SceneNet(field=MetricSettings(), generator=torch.Generator().manual_seed(seed))
+    return SceneNet(metric=MetricSettings(), generator=torch.Generator().manual_seed(seed))
 
 
 def bowl(x: np.ndarray) -> float:

@@ -132,7 +132,7 @@ def test_a_rate_that_has_decayed_moves_less(toys):
 
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
 def test_cross_entropy_falls_too_and_is_what_validation_tells(toys, kind):
-    init = "field" if kind == "cnn" else "thesis"
+    init = "informed" if kind == "cnn" else "thesis"
     chosen = settings(kind, epochs=30, init=init, loss=LossSettings(fidelity="cross_entropy"))
     model, history = fit(toys[:3], toys[3:], chosen, seed=0)
     assert history["fidelity"].iloc[-1] < 0.9 * history["fidelity"].iloc[0]

@@ -32,7 +32,7 @@ LEFT_OUT = 2
 """Real crops that are left out at a time."""
 
 FIELD_MODEL = ModelSettings(
-    name="scenenet-field",
+    name="scenenet-operational",
     kind="scenenet",
     kernel_size=(9, 9, 9),
     training=TrainingSettings(learning_rate=0.01, epochs=150),

@@ -119,6 +119,6 @@ def _what(material: Material, row: Mapping[Any, Any]) -> str:
         return f"free kernels{numbers}"
     trained = material.results.of_model(name)[0]
     protocol = ((trained.provenance or {}).get("settings") or {}).get("protocol", "thesis")
-    field = protocol == "field"
-    how = "with kernels in metres, searched for" if field else "trained by the thesis' protocol"
+    in_metres = protocol == "operational"
+    how = "with kernels in metres, searched for" if in_metres else "trained by the thesis' protocol"
     return f"a SCENE-Net{numbers} {how}"

@@ -34,7 +34,7 @@ def held(models, tmp_path_factory):
 def test_every_model_at_every_level_and_the_labels_beside(held):
     table, out = held
     assert tuple(table.columns) == COLUMNS == tuple(pd.read_csv(out).columns)
-    names = [LABELS, "field", "scenenet", "cnn", "black box"]
+    names = [LABELS, "operational", "scenenet", "cnn", "black box"]
     assert list(table["model"]) == 2 * names
     assert list(table["level"]) == 5 * [0] + 5 * [0.5]
     trained = table[table["model"] != LABELS]
@@ -65,7 +65,7 @@ def test_labels_are_scored_as_if_they_were_an_answer(held, line):
 def test_a_models_scores_are_those_of_the_same_training_by_itself(held, line, models):
     table, _ = held
     _, noisy = noisy_lines(line, (0, 0.5), GRID)
-    row = table[(table["model"] == "field") & (table["level"] == 0.5)].iloc[0]
+    row = table[(table["model"] == "operational") & (table["level"] == 0.5)].iloc[0]
     rival = train_and_tune(models[0], noisy.labelled[:3], noisy.labelled[4:5], 0)
     assert row["tau"] == rival.tau
     assert row["labels_f05"] == rival.score(noisy.labelled[6:]).f05
@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_scores(held, models, tmp_path):
     table, _ = held
     again = run_noise(STUDY, models[:1], GRID, 0, tmp_path / "again.csv")
     scores = [name for name in COLUMNS if name != "training_seconds"]
-    same = table["model"].isin([LABELS, "field", "black box"])
+    same = table["model"].isin([LABELS, "operational", "black box"])
     first = table[same].reset_index(drop=True)
     pd.testing.assert_frame_equal(first[scores], again[scores], check_dtype=False)
     other = run_noise(STUDY, [], GRID, 1, tmp_path / "other.csv")

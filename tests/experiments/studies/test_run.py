@@ -114,13 +114,13 @@ def test_small_numbers_are_written_out():
 def test_another_architecture_or_protocol_is_a_change_as_any_other():
     told = study(
         variants=[
-            {"name": "cnn", "changes": {"kind": "cnn", "training.init": "field"}},
-            {"name": "metres", "changes": {"protocol": "field", "search.searches": 1}},
+            {"name": "cnn", "changes": {"kind": "cnn", "training.init": "informed"}},
+            {"name": "metres", "changes": {"protocol": "operational", "search.searches": 1}},
         ]
     )
     cnn, metres = (plan.model for plan in told.plans(MODEL, GRID, SPLIT))
-    assert (cnn.kind, cnn.training.init, cnn.training.epochs) == ("cnn", "field", 2)
-    assert (metres.kind, metres.protocol, metres.search.searches) == ("scenenet", "field", 1)
+    assert (cnn.kind, cnn.training.init, cnn.training.epochs) == ("cnn", "informed", 2)
+    assert (metres.kind, metres.protocol, metres.search.searches) == ("scenenet", "operational", 1)
 
 
 def test_without_variants_there_is_nothing_to_do():
@@ -166,7 +166,7 @@ def test_models_of_other_kinds_are_trained_and_scored_beside(crops, tmp_path):
             {
                 "name": "metres",
                 "changes": {
-                    "protocol": "field", "search.searches": 1, "search.trial": 1,
+                    "protocol": "operational", "search.searches": 1, "search.trial": 1,
                     "search.starts": 8, "search.generations": 1, "search.population": 4,
                 },
             },

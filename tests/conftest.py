@@ -10,6 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
+# Workers that run side by side must not fight for cores, so each has one thread. Libraries read
+# this when they are loaded.
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import hypothesis
 import numpy as np
 import pytest
@@ -28,6 +33,21 @@ hypothesis.settings.load_profile("same-each-time")
 pytest_plugins = ["fixtures.noisy_lines", "fixtures.result_folder"]
 
 ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Share the tests out among workers so that no fixture of a session is made twice.
+
+    The tests of the workflow share one finished run, so one worker takes them all; it begins with
+    them, because they take the longest. The tests of any other file stay together.
+    """
+    items.sort(key=lambda item: item.path.parent.name != "workflow")
+    for item in items:
+        place = item.path.relative_to(ROOT / "tests")
+        group = place.parts[0] if place.parts[0] == "workflow" else place.as_posix()
+        item.add_marker(pytest.mark.xdist_group(group))
+
 
 PLACE = np.array([500_000.0, 4_630_000.0, 100.0])
 """Where the small scenes lie, m: far from zero, as surveys do, where float32 has lost the metre."""

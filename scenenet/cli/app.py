@@ -34,6 +34,9 @@ from scenenet.cli.output import _answer, _score_lines, _training_lines
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
 
+BENCH_CODES = Codes("edp")
+"""Class scheme of the public TS40K crops."""
+
 app = typer.Typer(
     help="Find power-line towers in LiDAR surveys with SCENE-Net: eleven numbers with a meaning.",
     no_args_is_help=True,
@@ -296,7 +299,7 @@ def bench(
     crops: Annotated[
         Path | None, typer.Option(help="Folder of TS40K samples; synthetic crops if not given.")
     ] = None,
-    codes: LabelCodes = Codes.edp,
+    codes: LabelCodes = BENCH_CODES,
     quick: Annotated[
         bool, typer.Option("--quick", help="The convolution alone; under a minute.")
     ] = False,

@@ -8,13 +8,10 @@ from typing import Annotated
 
 import typer
 
+from scenenet.pointcloud.class_schemes import SCHEMES, difference
 
-class Codes(StrEnum):
-    """Class schemes; see ``scenenet.pointcloud.class_schemes``."""
-
-    edp = "edp"
-    asprs = "asprs"
-    ts40k = "ts40k"
+Codes = StrEnum("Codes", {name: name for name in SCHEMES})  # type: ignore[misc]
+"""Class schemes; see ``scenenet.pointcloud.class_schemes``."""
 
 
 class Fit(StrEnum):
@@ -56,7 +53,7 @@ ModelFile = Annotated[Path, typer.Option("--model", help="Model file (.json or .
 
 LabelCodes = Annotated[
     Codes,
-    typer.Option("--codes", help="What the class codes mean; wires are 16 in edp, 14 in asprs."),
+    typer.Option("--codes", help=f"Class scheme of the labels ({difference()})."),
 ]
 
 

@@ -16,7 +16,6 @@ from scenenet.core.errors import InputError
 from scenenet.figures.selection import (
     POINTS_PER_PICTURE,
     champion_of,
-    class_groups,
     crop_cloud,
     ranked,
     thinned,
@@ -37,7 +36,7 @@ def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[s
     chosen_by = champion_of(results, reference)
     sample = ranked(chosen_by, rank)
     cloud = crop_cloud(results, sample)
-    views = [View("labels", class_groups(cloud), "class")]
+    views = [View("labels", cloud.roles, "class")]
     views += [_probability(cloud, champion_of(results, model)) for model in results.models]
     keep = thinned(len(cloud))
     shown = [replace(view, values=view.values[keep]) for view in views]

@@ -15,7 +15,6 @@ from scenenet.core.errors import InputError
 from scenenet.figures.selection import (
     POINTS_PER_PICTURE,
     champion_of,
-    class_groups,
     crop_cloud,
     ranked,
     thinned,
@@ -24,7 +23,7 @@ from scenenet.figures.selection import (
 from scenenet.results.folder import Results, read_result
 
 if TYPE_CHECKING:
-    from scenenet.dataset.zarr_store import StoreReader
+    pass
 
 GRID_RESOLUTIONS = (32, 64, 128)
 
@@ -58,8 +57,8 @@ def draw_labels(survey: str, path: str, codes: str, out: Path) -> tuple[str, str
     places, names = [np.empty((0, 3))], [np.empty(0, "U10")]
     start = 0
     for chunk in iter_chunks(path, codes):
-        groups = class_groups(chunk)
-        keep = np.isin(groups, ("tower", "wire"))
+        groups = chunk.roles
+        keep = np.isin(groups, ("tower", "conductor"))
         # Every n-th of the others, counted over the survey and not over its chunks.
         keep[(-start) % step :: step] = True
         start += len(groups)
@@ -77,7 +76,8 @@ def draw_labels(survey: str, path: str, codes: str, out: Path) -> tuple[str, str
 def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
     """The crop with the median number of points of each survey; of recorded samples more."""
     from scenenet.dataset.zarr_store import StoreReader
-    from scenenet.figures.plots.surveys import crops_beside, kinds_of
+    from scenenet.figures.plots.surveys import crops_beside
+    from scenenet.pointcloud import class_scheme
 
     shown = {}
     for survey in results.surveys:
@@ -90,7 +90,7 @@ def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
             arrays = reader.get(entry["id"])
             keep = thinned(len(arrays["xyz"]))
             codes = arrays["classification"][keep]
-            kinds = kinds_of(codes) if reader.manifest["codes"] == "edp" else _plain(codes, reader)
+            kinds = class_scheme(reader.manifest["codes"]).looks(codes)
             title = f"{entry['id']}\n({'synthetic' if made else 'recorded'})"
             shown[title] = (arrays["xyz"][keep], kinds)
     if not shown:
@@ -108,7 +108,7 @@ def draw_grids(results: Results, reference: str, out: Path) -> tuple[str, str]:
 
     sample = ranked(champion_of(results, reference), "best")
     cloud = crop_cloud(results, sample)
-    groups = class_groups(cloud)
+    groups = cloud.roles
     grids = {}
     for resolution in GRID_RESOLUTIONS:
         voxels = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution))
@@ -130,16 +130,3 @@ def _tower_settings(results: Results, survey: str) -> Mapping[str, Any]:
 
     recorded = read_result(path).get("settings", {})
     return {name: recorded[name] for name in TowerSettings.model_fields if name in recorded}
-
-
-def _plain(codes: np.ndarray, reader: StoreReader) -> np.ndarray:
-    """What points are (N,), by the groups of their class scheme."""
-    from scenenet.pointcloud import class_scheme
-
-    scheme = class_scheme(reader.manifest["codes"])
-    kinds = np.full(len(codes), "other", dtype="U10")
-    for name, group in (("ground", scheme.ground), ("tall", scheme.vegetation),
-                        ("stray", scheme.noise), ("wire", scheme.wire),
-                        ("tower", scheme.tower)):  # fmt: skip
-        kinds[np.isin(codes, list(group))] = name
-    return kinds

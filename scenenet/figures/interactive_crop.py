@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenenet.core.files import write_json
+from scenenet.pointcloud.class_schemes import ROLE_COLOURS
 from scenenet.results.folder import Results
 
 if TYPE_CHECKING:
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.base import VoxelModel
 
-CLASSES = ("other", "ground", "vegetation", "wire", "tower")
-"""What a voxel shows, the later where it holds several."""
+CLASSES = tuple(reversed(tuple(ROLE_COLOURS)))
+"""What a voxel shows: the last of these that any of its points is."""
 
 
 def write_scene(
@@ -52,7 +53,6 @@ def write_scene(
     from scenenet.evaluation.crop_towers import find_in_crop
     from scenenet.figures.selection import (
         champion_of,
-        class_groups,
         crop_cloud,
         ranked,
         voxel_classes,
@@ -75,7 +75,7 @@ def write_scene(
     counts = confusion(voxels.spread(whole)[0], truth, 0.5).scores()
     taus = THRESHOLDS.astype(probability.dtype)
     zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
-    names = voxel_classes(class_groups(cloud), voxels.grid.voxel_of(cloud.xyz), voxels.index)
+    names = voxel_classes(cloud.roles, voxels.grid.voxel_of(cloud.xyz), voxels.index)
     scene = {
         "crop": sample["id"],
         "rank": rank,

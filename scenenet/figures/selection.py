@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenenet.core.errors import InputError
-from scenenet.figures.plots.surveys import kinds_of
+from scenenet.pointcloud.class_schemes import ROLE_COLOURS
 from scenenet.results.folder import Results, SeedResult, read_table
 
 if TYPE_CHECKING:
     from scenenet.pointcloud import PointCloud
 
-CLASSES = ("tower", "wire", "vegetation", "ground", "other")
-"""What a point may be, those that matter most first."""
+CLASSES = tuple(ROLE_COLOURS)
+"""What a point may be, the most important first."""
 
 POINTS_PER_PICTURE = 60_000
 """Enough to look dense at the size the pictures have."""
@@ -57,26 +57,11 @@ def crop_cloud(results: Results, sample: Mapping[str, Any]) -> PointCloud:
     return PointCloud(arrays["xyz"], arrays["classification"], scheme)
 
 
-def class_groups(cloud: PointCloud) -> np.ndarray:
-    """(N,) what each point is, as ``figures.CLASS_COLOURS`` names it.
-
-    The public TS40K crops code trees otherwise than Table 5.1 says (``figures.beside.EDP_KINDS``).
-    """
-    groups = np.full(len(cloud), "other", dtype="U10")
-    if cloud.scheme is not None and cloud.scheme.name == "edp":
-        kinds = kinds_of(cloud.classification)
-        groups[np.isin(kinds, ("low", "tall"))] = "vegetation"
-        groups[kinds == "ground"] = "ground"
-    for name in ("ground", "vegetation", "wire", "tower"):
-        groups[np.isin(cloud.classification, list(getattr(cloud.scheme, name)))] = name
-    return groups
-
-
 def voxel_classes(groups: np.ndarray, voxel: np.ndarray, index: np.ndarray) -> np.ndarray:
     """(M,) what each occupied voxel holds: the first of ``CLASSES`` that any of its points is.
 
     Args:
-        groups: (N,) of ``class_groups``.
+        groups: (N,) of ``ClassScheme.roles``.
         voxel: (N,) flat voxel of each point.
         index: (M,) flat occupied voxels, ascending.
     """

@@ -1,160 +1,270 @@
-"""What the class codes of a survey mean.
+"""Class schemes: what the class codes of a survey mean.
 
-Three schemes are known: ``edp`` (thesis Table 5.1), ``asprs`` (LAS 1.4, Table 17) and ``ts40k``,
-the six merged classes with which the TS40K dataset's own tools write its ``.pt`` samples. Code 15
-is a transmission tower in the first two, but most other codes differ (16 is a wire in the one and
-14 in the other), and in the third a tower is 4, which is vegetation in the others. So the user
-names the scheme and it is never guessed.
+Three schemes are known: ``edp`` (thesis Table 5.1), ``asprs`` (LAS 1.4, Table 17) and ``ts40k``
+(the six merged classes of the ``.pt`` samples that the TS40K dataset's own tools write). Code 15 is
+a transmission tower in the first two, but most other codes differ: a conductor is 16 in ``edp`` and
+14 in ``asprs``. In ``ts40k`` a tower is 4, which is vegetation in the other two. The user therefore
+names the scheme; it is never guessed.
+
+``SCHEMES`` is the only place that lists schemes. The settings, the choices of the command line, the
+pictures, the codes of synthetic surveys and the table in the documentation follow from it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
-from typing import Literal
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
 from scenenet.core.errors import InputError
 
+Role = Literal["tower", "conductor", "vegetation", "ground", "noise", "other"]
+"""What a class is to the method. ``ground`` includes surfaces on it; ``noise`` are the points that
+the producer marked as noise."""
+
+Look = Literal["ground", "low", "tall", "stray", "other", "conductor", "tower"]
+"""What a point looks like in a crop: ``low`` and ``tall`` are vegetation and objects by height."""
+
+LOOK_COLOURS: Mapping[Look, str] = MappingProxyType(
+    {
+        "ground": "#A98B6D",
+        "low": "#A6C36F",
+        "tall": "#2F7D4F",
+        "stray": "#CC79A7",
+        "other": "#B5BAC1",
+        "conductor": "#E69F00",
+        "tower": "#D62728",
+    }
+)
+"""Colour of each look in pictures that show low and tall objects apart; later ones are drawn over
+earlier ones."""
+
+ROLE_COLOURS: Mapping[Role, str] = MappingProxyType(
+    {
+        "tower": LOOK_COLOURS["tower"],
+        "conductor": LOOK_COLOURS["conductor"],
+        "vegetation": "#4C9A52",
+        "ground": LOOK_COLOURS["ground"],
+        "other": LOOK_COLOURS["other"],
+    }
+)
+"""Colour of each role in all other pictures, the most important role first."""
+
+_LOOK_OF_ROLE: Mapping[Role, Look] = MappingProxyType({"vegetation": "tall", "noise": "stray"})
+_ROLE_OF_LOOK: Mapping[Look, Role] = MappingProxyType(
+    {"low": "vegetation", "tall": "vegetation", "ground": "ground"}
+)
+
+
+class ClassCode(NamedTuple):
+    """One class of a scheme.
+
+    Attributes:
+        code: the number in the file.
+        name: the name that the scheme gives the class.
+        role: what the class is to the method.
+        look: what points of this class look like, where this does not follow from the role. For
+            ``edp`` it is how the public TS40K crops use the code (docs: synthetic surveys).
+    """
+
+    code: int
+    name: str
+    role: Role = "other"
+    look: Look | None = None
+
+    @property
+    def drawn_look(self) -> Look:
+        """The look, or the one that follows from the role."""
+        if self.look is not None:
+            return self.look
+        return _LOOK_OF_ROLE.get(self.role) or self.role  # type: ignore[return-value]
+
+    @property
+    def drawn_role(self) -> Role:
+        """The role if it has a colour of its own, else the one that follows from the look."""
+        if self.role in ROLE_COLOURS and self.role != "other":
+            return self.role
+        return _ROLE_OF_LOOK.get(self.drawn_look, "other")
+
 
 @dataclass(frozen=True)
 class ClassScheme:
-    """Names of class codes, and the codes that the method needs to know.
+    """A list of class codes.
 
     Attributes:
-        name: the name used in the survey sheet and on the command line.
-        classes: code -> name of the class.
-        tower: codes of power-line supporting towers.
-        wire: codes of conductors.
-        ground: codes of bare ground and surfaces on it.
-        vegetation: codes of vegetation.
-        noise: codes of points that the producer marked as noise.
+        name: the name in the survey sheet and on the command line.
+        description: which surveys use the scheme.
+        codes: its classes, by code.
     """
 
     name: str
-    classes: Mapping[int, str]
-    tower: frozenset[int]
-    wire: frozenset[int]
-    ground: frozenset[int]
-    vegetation: frozenset[int]
-    noise: frozenset[int]
+    description: str
+    codes: tuple[ClassCode, ...]
+
+    @cached_property
+    def classes(self) -> Mapping[int, str]:
+        """Code -> name of the class."""
+        return {entry.code: entry.name for entry in self.codes}
+
+    @cached_property
+    def tower(self) -> frozenset[int]:
+        """Codes of power-line support towers."""
+        return self.with_role("tower")
+
+    def with_role(self, role: Role) -> frozenset[int]:
+        """Codes of all classes with ``role``."""
+        return frozenset(entry.code for entry in self.codes if entry.role == role)
 
     def class_name(self, code: int) -> str:
+        """The name of a code; "undefined (77)" for one that the scheme does not list."""
         return self.classes.get(int(code), f"undefined ({int(code)})")
 
+    def code_of(self, name: str) -> int:
+        """The code of the class called ``name``.
+
+        Raises:
+            KeyError: the scheme has no such class.
+        """
+        return {entry.name: entry.code for entry in self.codes}[name]
+
     def is_tower(self, classification: np.ndarray) -> np.ndarray:
-        """Boolean mask (N,) of the points labelled tower."""
+        """(N,) bool: the points labelled tower, from their class codes (N,)."""
         return np.isin(classification, list(self.tower))
+
+    def roles(self, classification: np.ndarray) -> np.ndarray:
+        """(N,) keys of ``ROLE_COLOURS``, from class codes (N,) uint8."""
+        return _lookup({c.code: c.drawn_role for c in self.codes}, classification)
+
+    def looks(self, classification: np.ndarray) -> np.ndarray:
+        """(N,) keys of ``LOOK_COLOURS``, from class codes (N,) uint8."""
+        return _lookup({c.code: c.drawn_look for c in self.codes}, classification)
+
+
+def _lookup(names: Mapping[int, str], classification: np.ndarray) -> np.ndarray:
+    return np.array([names.get(code, "other") for code in range(256)])[classification]
 
 
 EDP = ClassScheme(
-    name="edp",
-    classes=MappingProxyType(
-        {
-            0: "Created",
-            1: "Unclassified",
-            2: "Ground",
-            3: "Low vegetation",
-            4: "Medium vegetation",
-            5: "Natural obstacle",
-            6: "Human structures",
-            7: "Low point",
-            8: "Model keypoints",
-            9: "Water",
-            10: "Rail",
-            11: "Road surface",
-            12: "Overlap points",
-            13: "Medium reliability",
-            14: "Low reliability",
-            15: "Power line support tower",
-            16: "Main power line",
-            17: "Other power line",
-            18: "Fiber optic cable",
-            19: "Not rated object to be considered",
-            20: "Not rated object to be ignored",
-            21: "Incidents",
-        }
+    "edp",
+    "surveys of EDP and the public TS40K `.npy` crops (thesis Table 5.1)",
+    (
+        ClassCode(0, "Created"),
+        ClassCode(1, "Unclassified"),
+        ClassCode(2, "Ground", "ground"),
+        ClassCode(3, "Low vegetation", "vegetation", "low"),
+        ClassCode(4, "Medium vegetation", "vegetation", "low"),
+        ClassCode(5, "Natural obstacle", "vegetation", "tall"),
+        ClassCode(6, "Human structures"),
+        ClassCode(7, "Low point", "noise"),
+        ClassCode(8, "Model keypoints"),
+        ClassCode(9, "Water", "other", "ground"),
+        ClassCode(10, "Rail", "ground"),
+        ClassCode(11, "Road surface", "ground", "low"),
+        ClassCode(12, "Overlap points", "other", "tall"),
+        ClassCode(13, "Medium reliability"),
+        ClassCode(14, "Low reliability"),
+        ClassCode(15, "Power line support tower", "tower"),
+        ClassCode(16, "Main power line", "conductor"),
+        ClassCode(17, "Other power line", "conductor"),
+        ClassCode(18, "Fiber optic cable"),
+        ClassCode(19, "Not rated object to be considered", "other", "ground"),
+        ClassCode(20, "Not rated object to be ignored"),
+        ClassCode(21, "Incidents"),
     ),
-    tower=frozenset({15}),
-    wire=frozenset({16, 17}),
-    ground=frozenset({2, 10, 11}),
-    vegetation=frozenset({3, 4, 5}),
-    noise=frozenset({7}),
 )
 
 ASPRS = ClassScheme(
-    name="asprs",
-    classes=MappingProxyType(
-        {
-            0: "Created, never classified",
-            1: "Unclassified",
-            2: "Ground",
-            3: "Low vegetation",
-            4: "Medium vegetation",
-            5: "High vegetation",
-            6: "Building",
-            7: "Low point (noise)",
-            8: "Model keypoint",
-            9: "Water",
-            10: "Rail",
-            11: "Road surface",
-            12: "Overlap points",
-            13: "Wire - guard (shield)",
-            14: "Wire - conductor (phase)",
-            15: "Transmission tower",
-            16: "Wire-structure connector (insulator)",
-            17: "Bridge deck",
-            18: "High noise",
-            19: "Overhead structure",
-            20: "Ignored ground",
-            21: "Snow",
-            22: "Temporal exclusion",
-        }
+    "asprs",
+    "surveys that follow the LAS 1.4 standard",
+    (
+        ClassCode(0, "Created, never classified"),
+        ClassCode(1, "Unclassified"),
+        ClassCode(2, "Ground", "ground"),
+        ClassCode(3, "Low vegetation", "vegetation"),
+        ClassCode(4, "Medium vegetation", "vegetation"),
+        ClassCode(5, "High vegetation", "vegetation"),
+        ClassCode(6, "Building"),
+        ClassCode(7, "Low point (noise)", "noise"),
+        ClassCode(8, "Model keypoint"),
+        ClassCode(9, "Water"),
+        ClassCode(10, "Rail"),
+        ClassCode(11, "Road surface", "ground"),
+        ClassCode(12, "Overlap points"),
+        ClassCode(13, "Wire - guard (shield)", "conductor"),
+        ClassCode(14, "Wire - conductor (phase)", "conductor"),
+        ClassCode(15, "Transmission tower", "tower"),
+        ClassCode(16, "Wire-structure connector (insulator)"),
+        ClassCode(17, "Bridge deck"),
+        ClassCode(18, "High noise", "noise"),
+        ClassCode(19, "Overhead structure"),
+        ClassCode(20, "Ignored ground"),
+        ClassCode(21, "Snow"),
+        ClassCode(22, "Temporal exclusion"),
     ),
-    tower=frozenset({15}),
-    wire=frozenset({13, 14}),
-    ground=frozenset({2, 11}),
-    vegetation=frozenset({3, 4, 5}),
-    noise=frozenset({7, 18}),
 )
 
 TS40K = ClassScheme(
-    name="ts40k",
-    classes=MappingProxyType(
-        {
-            0: "Noise",
-            1: "Ground",
-            2: "Low vegetation",
-            3: "Medium vegetation and obstacles",
-            4: "Power line support tower",
-            5: "Power lines",
-        }
+    "ts40k",
+    "`.pt` samples written by the tools of TS40K, which merge the 22 codes into six",
+    (
+        ClassCode(0, "Noise", "noise"),
+        ClassCode(1, "Ground", "ground"),
+        ClassCode(2, "Low vegetation", "vegetation"),
+        ClassCode(3, "Medium vegetation and obstacles", "vegetation"),
+        ClassCode(4, "Power line support tower", "tower"),
+        ClassCode(5, "Power lines", "conductor"),
     ),
-    tower=frozenset({4}),
-    wire=frozenset({5}),
-    ground=frozenset({1}),
-    vegetation=frozenset({2, 3}),
-    noise=frozenset({0}),
 )
 
-Codes = Literal["edp", "asprs", "ts40k"]
-"""The names of ``SCHEMES``, as settings take them."""
+SCHEMES: Mapping[str, ClassScheme] = MappingProxyType(
+    {scheme.name: scheme for scheme in (EDP, ASPRS, TS40K)}
+)
+"""Every scheme by its name; a new one is added here and nowhere else."""
 
-SCHEMES: Mapping[str, ClassScheme] = MappingProxyType({"edp": EDP, "asprs": ASPRS, "ts40k": TS40K})
+if TYPE_CHECKING:
+    Codes = str
+else:
+    Codes = Literal[tuple(SCHEMES)]
+    """The names of ``SCHEMES``, as settings take them."""
 
 
 def class_scheme(name: str) -> ClassScheme:
     """The scheme called ``name``.
 
     Raises:
-        InputError: there is no such scheme; the message lists those there are.
+        InputError: there is no such scheme; the message lists the known ones.
     """
     try:
         return SCHEMES[name]
     except KeyError:
         raise InputError(
-            f"unknown class codes {name!r}",
-            remedy=f"Name one of: {', '.join(SCHEMES)} (they differ: wires are 16, 14 or 5)",
+            f"unknown class scheme {name!r}",
+            remedy=f"Choose one of: {', '.join(SCHEMES)} ({difference()})",
         ) from None
+
+
+def difference() -> str:
+    """How the schemes differ, in one line: the codes of towers and conductors in each."""
+    return "; ".join(
+        f"{name}: tower {_listed(scheme.tower)}, conductor {_listed(scheme.with_role('conductor'))}"
+        for name, scheme in SCHEMES.items()
+    )
+
+
+def markdown() -> str:
+    """The schemes as a Markdown table, for the documentation."""
+    rows = [
+        f"| `{name}` | {_listed(scheme.tower)} | {_listed(scheme.with_role('conductor'))} "
+        f"| {_listed(scheme.with_role('ground'))} | {scheme.description} |"
+        for name, scheme in SCHEMES.items()
+    ]
+    head = ["| scheme | tower | conductors | ground | use it for |", "|---|---|---|---|---|"]
+    return "\n".join([*head, *rows])
+
+
+def _listed(codes: Iterable[int]) -> str:
+    return ", ".join(map(str, sorted(codes)))

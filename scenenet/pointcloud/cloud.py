@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.core.errors import InputError
-from scenenet.pointcloud.class_schemes import ClassScheme
+from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme
 
 if TYPE_CHECKING:
     import pyproj
@@ -22,7 +22,7 @@ class PointCloud:
         xyz: (N, 3) float64, metres, x east, y north, z up, in the survey's CRS. Never float32: at a
             northing of 4 630 000 m a float32 step is half a metre.
         classification: (N,) uint8 class codes.
-        scheme: what the codes mean; None where nobody has said (it is never guessed).
+        scheme: what the codes mean; None if the user did not name it (it is never guessed).
         crs: coordinate reference system; None where the file names none.
     """
 
@@ -48,14 +48,26 @@ class PointCloud:
         """(N,) bool: points labelled tower.
 
         Raises:
-            InputError: the meaning of the class codes is not known.
+            InputError: the class scheme is not known.
         """
+        return self._known_scheme().is_tower(self.classification)
+
+    @property
+    def roles(self) -> np.ndarray:
+        """(N,) what each point is, keys of ``class_schemes.ROLE_COLOURS``.
+
+        Raises:
+            InputError: the class scheme is not known.
+        """
+        return self._known_scheme().roles(self.classification)
+
+    def _known_scheme(self) -> ClassScheme:
         if self.scheme is None:
             raise InputError(
-                "the meaning of the class codes is not known",
-                remedy="Name them with codes: edp or asprs (--codes on the command line)",
+                "the class scheme of the labels is not known",
+                remedy=f"Give it as codes (--codes on the command line): {', '.join(SCHEMES)}",
             )
-        return self.scheme.is_tower(self.classification)
+        return self.scheme
 
     def select(self, index: np.ndarray) -> PointCloud:
         """The points at ``index`` (a mask or positions), in that order."""

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from scenenet.synthetic.codes import CONDUCTOR, LOW, SCRUB, STRAY, TALL, TOWER, TREE
 from scenenet.synthetic.scene.line import TOWER as TOWER_STREAM
 from scenenet.synthetic.scene.line import Support
 from scenenet.synthetic.scene.random_fields import Raster, stream
-from scenenet.synthetic.settings import LOW, SCRUB, STRAY, TALL, TOWER, TREE, WIRE
 
 HALF_SIDE_M = 1.9
 """Half the side of the prism at strength 0.5."""
@@ -72,7 +72,7 @@ def annotate(
         beside = (np.abs(along) < half_along) & (draw < coverage)
         inside = beside & (np.abs(across) < half_across)
         # Wires hold on at the arms, which may be wider than the prism.
-        taken = (inside & np.isin(classes, TAKEN)) | (beside & (classes == WIRE))
+        taken = (inside & np.isin(classes, TAKEN)) | (beside & (classes == CONDUCTOR))
         if patch > 0:
             above = points[:, 2] - terrain.bilinear(points[:, 0], points[:, 1])
             low = inside & (above < GROUND_PATCH_M) & (classes != STRAY)

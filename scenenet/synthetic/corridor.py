@@ -16,6 +16,7 @@ from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import EDP
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.synthetic.annotation_noise import annotate
+from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.returns.clutter import clutter_points
 from scenenet.synthetic.returns.conductors import other_cables, wire_points
 from scenenet.synthetic.returns.flight import Flight, flight_of
@@ -28,7 +29,7 @@ from scenenet.synthetic.scene.strip import Strip
 from scenenet.synthetic.scene.terrain import Terrain
 from scenenet.synthetic.scene.towers import place, sample
 from scenenet.synthetic.scene.vegetation import WIDEST_CROWN_M, Vegetation, keep_clear
-from scenenet.synthetic.settings import TOWER, SyntheticSettings
+from scenenet.synthetic.settings import SyntheticSettings
 
 Coded = tuple[np.ndarray, np.ndarray]
 """Points (N, 3) and their codes (N,)."""

@@ -189,17 +189,3 @@ class SyntheticSettings(Settings):
                 f" {shortest:.0f} m"
             )
         return self
-
-
-UNCLASSIFIED, GROUND, GRASS, SCRUB, TREE, STRAY, WATER = 1, 2, 3, 4, 5, 7, 9
-
-
-BARE, LOW, TALL, TOWER, WIRE, BARE_TOO = 10, 11, 12, 15, 16, 19
-
-
-TALL_M = 2.0
-"""What is higher above the ground than this is tall."""
-
-
-ON_GROUND = (GROUND, GRASS, BARE, BARE_TOO, WATER)
-"""Codes of what lies on the ground."""

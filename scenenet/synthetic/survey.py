@@ -12,8 +12,9 @@ import numpy as np
 from scenenet.core.files import write_json
 from scenenet.core.progress import track
 from scenenet.pointcloud.las.writing import las_stream
+from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.corridor import TrueTower, make_corridor
-from scenenet.synthetic.settings import TOWER, SyntheticSettings
+from scenenet.synthetic.settings import SyntheticSettings
 
 
 def make_survey(

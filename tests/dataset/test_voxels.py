@@ -100,7 +100,7 @@ def test_presence_is_one_and_density_relates_to_the_fullest_voxel():
 
 def test_labels_of_unknown_meaning_are_refused():
     unnamed = PointCloud(np.zeros((2, 3)), np.full(2, 15, np.uint8))
-    with pytest.raises(InputError, match="edp or asprs"):
+    with pytest.raises(InputError, match=r"class scheme.*edp, asprs"):
         voxelise(unnamed, VoxelGrid((0.0, 0.0, 0.0), 1.0, (1, 1, 1)))
 
 

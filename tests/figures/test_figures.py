@@ -139,10 +139,10 @@ def test_a_survey_is_turned_so_that_its_line_lies_flat(tmp_path: Path):
 
 
 def test_a_voxel_has_the_colour_of_what_matters_most_in_it():
-    groups = np.array(["ground", "tower", "ground", "vegetation", "wire", "other"])
+    groups = np.array(["ground", "tower", "ground", "vegetation", "conductor", "other"])
     voxel = np.array([7, 7, 3, 3, 9, 12])
     found = voxel_classes(groups, voxel, np.array([3, 7, 9, 12]))
-    assert list(found) == ["vegetation", "tower", "wire", "other"]
+    assert list(found) == ["vegetation", "tower", "conductor", "other"]
 
 
 def test_axes_of_kernels_in_metres_reach_as_far_as_the_kernel(tmp_path: Path, monkeypatch):

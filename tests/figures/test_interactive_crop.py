@@ -30,7 +30,7 @@ def test_every_voxel_has_a_place_a_class_and_a_part_of_each_operator(scene):
     assert len(decoded(scene["zyx"], "<i2")) == 3 * len(tower)
     # A voxel that holds a tower point shows the tower, whatever else is in it.
     assert set(classes[tower > 0]) == {CLASSES.index("tower")}
-    assert {CLASSES[code] for code in set(classes)} == {"ground", "wire", "tower"}
+    assert {CLASSES[code] for code in set(classes)} == {"ground", "conductor", "tower"}
     assert list(scene["shares"]) == ["cylinder", "arrow", "negative_sphere"]
     shares = np.array([decoded(text, "<i1") for text in scene["shares"].values()], int)
     assert np.abs(np.abs(shares).sum(axis=0) - 100).max() <= 2

@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from scenenet.synthetic import corridor_cloud, make_corridor
-from scenenet.synthetic.settings import BARE, BARE_TOO, GROUND, LOW, SCRUB, TALL, TOWER, TREE, WIRE
+from scenenet.synthetic.codes import (
+    BARE,
+    BARE_TOO,
+    CONDUCTOR,
+    GROUND,
+    LOW,
+    SCRUB,
+    TALL,
+    TOWER,
+    TREE,
+)
 
 
 def test_labels_without_annotation_noise_are_the_truth(small):
@@ -21,7 +31,7 @@ def test_about_half_of_the_tower_labels_are_wrong_by_default(default):
     assert labelled[truth == TOWER].all(), "annotators miss no tower points"
     wrong_classes = truth[labelled & (truth != TOWER)]
     assert (wrong_classes == LOW).sum() > 500, "grass and scrub at the foot"
-    assert (wrong_classes == WIRE).sum() > 200, "and wire ends"
+    assert (wrong_classes == CONDUCTOR).sum() > 200, "and wire ends"
 
 
 @pytest.mark.parametrize(("kind", "ground_too"), [("lattice_pole", False), ("lattice", True)])
@@ -31,7 +41,7 @@ def test_poles_and_pylons_have_wrong_labels_of_their_own_kind(small, kind, groun
     wrong = truth[cloud.is_tower & (truth != TOWER)]
     assert 0.2 < len(wrong) / cloud.is_tower.sum() < 0.85
     assert np.isin(wrong, (GROUND, BARE, BARE_TOO)).any() == ground_too
-    assert np.isin(wrong, (SCRUB, TREE, LOW, TALL, WIRE)).any()
+    assert np.isin(wrong, (SCRUB, TREE, LOW, TALL, CONDUCTOR)).any()
 
 
 def test_wrong_labels_lie_in_a_prism_along_the_line(small):

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import EDP
 from scenenet.synthetic import corridor_cloud, make_corridor
-from scenenet.synthetic.settings import ON_GROUND, TALL, TOWER, TREE, WIRE
+from scenenet.synthetic.codes import CONDUCTOR, ON_GROUND, TALL, TOWER, TREE
 
 
 def test_same_seed_same_points(small):
@@ -118,7 +118,7 @@ def test_wires_run_from_tower_to_tower_above_the_ground(small):
     for stretch in list(corridor)[1:-1]:
         k = stretch.index
         before, after = corridor.line.support(k), corridor.line.support(k + 1)
-        wires = stretch.xyz[stretch.truth == WIRE]
+        wires = stretch.xyz[stretch.truth == CONDUCTOR]
         wires = wires - [corridor.settings.easting, corridor.settings.northing, 0]
         for support in (before, after):
             for held in support.attachments:
@@ -138,7 +138,7 @@ def test_classes_are_edp_codes_with_the_bulk_where_the_thesis_has_it(default):
     # Thesis Table 5.1: 87 % in classes 10, 11 and 12, 0.5 % tower, 0.9 % wire.
     assert share[[10, 11, 12]].sum() > 0.7
     assert 0.002 < share[TOWER] < 0.02
-    assert 0.002 < share[WIRE] < 0.02
+    assert 0.002 < share[CONDUCTOR] < 0.02
     assert share[[1, 2, 3, 4, 5, 7]].max() < 0.08
 
 

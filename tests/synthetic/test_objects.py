@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from scenenet.synthetic import corridor_cloud, make_corridor
+from scenenet.synthetic.codes import CONDUCTOR, LOW, ON_GROUND, STRAY, TALL, TOWER, TREE, WATER
 from scenenet.synthetic.returns.clutter import MAKERS
 from scenenet.synthetic.returns.conductors import BUNDLE_M, bundled
 from scenenet.synthetic.scene.towers import KINDS
-from scenenet.synthetic.settings import LOW, ON_GROUND, STRAY, TALL, TOWER, TREE, WATER, WIRE
 
 
 def heights(settings, cloud, truth, codes):
@@ -41,7 +41,7 @@ def test_every_kind_of_clutter(bare, kind):
 
 def test_nothing_stands_about_where_nothing_is_asked_for(bare):
     _, truth, _ = corridor_cloud(bare())
-    assert set(np.unique(truth).tolist()) <= {*ON_GROUND, TOWER, WIRE}
+    assert set(np.unique(truth).tolist()) <= {*ON_GROUND, TOWER, CONDUCTOR}
 
 
 def test_trees_bushes_and_hedges(bare):
@@ -101,7 +101,7 @@ def test_conductors_bundles_and_earth_wires(bare, circuits, bundle, earth_wires)
         assert gap.min() > 2 * BUNDLE_M
     sparse = corridor_cloud(bare(towers=2))[1]
     dense = corridor_cloud(settings)[1]
-    ratio = (dense == WIRE).sum() / (sparse == WIRE).sum()
+    ratio = (dense == CONDUCTOR).sum() / (sparse == CONDUCTOR).sum()
     assert ratio == pytest.approx(len(wires) / 3, rel=0.15)
 
 

@@ -12,8 +12,8 @@ from scenenet.dataset.voxels import VoxelSample, VoxelSettings, voxelise
 from scenenet.pointcloud.class_schemes import EDP
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.synthetic import SyntheticSettings, make_corridor
+from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.corridor import Corridor
-from scenenet.synthetic.settings import TOWER
 
 STRENGTHS = tuple(np.linspace(0, 1, 26).round(2).tolist())
 """Strengths of the annotation between which the wanted one is interpolated."""

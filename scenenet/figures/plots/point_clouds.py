@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from scenenet.figures.plots.style import COLOURS, TOWER_COLOUR, new_figure, save
+from scenenet.pointcloud.class_schemes import ROLE_COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-CLASS_COLOURS = {"tower": TOWER_COLOUR, "wire": "#E69F00", "vegetation": "#4C9A52",
-                 "ground": "#A98B6D", "other": "#B5BAC1"}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class View:
 
     Attributes:
         title: above the panel.
-        values: (N,) names of ``CLASS_COLOURS``, or (N,) float probabilities in [0, 1].
+        values: (N,) names of ``ROLE_COLOURS``, or (N,) float probabilities in [0, 1].
         kind: which of the two.
     """
 
@@ -66,7 +64,7 @@ def side_views(xyz: np.ndarray, views: Sequence[View], out: str | Path) -> str:
     if points is not None:
         figure.colorbar(points, ax=axes[0, -1], shrink=0.7, label="probability")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(CLASS_COLOURS),
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(ROLE_COLOURS),
                   frameon=False, markerscale=4, fontsize=9)  # fmt: skip
     axes[0, 0].set_ylabel("height [m]")
     save(figure, out)
@@ -113,7 +111,7 @@ def voxel_grids(grids: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | P
 
     Args:
         grids: title -> ((M, 3) integer z, y, x of the occupied voxels, (M,) names of
-            ``CLASS_COLOURS``).
+            ``ROLE_COLOURS``).
         out: PNG to write.
     """
     from matplotlib.figure import Figure
@@ -124,11 +122,11 @@ def voxel_grids(grids: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | P
         z, y, x = zyx.T
         longest = max(1, int(np.ptp(zyx, axis=0).max()) + 1)
         size = (190 / longest) ** 2
-        for name in reversed(list(CLASS_COLOURS)):
+        for name in reversed(list(ROLE_COLOURS)):
             member = names == name
             # One by one, so that what stands in front of a tower does not hide it.
-            axis.scatter(x[member], y[member], z[member], c=CLASS_COLOURS[name], s=size, marker="s",
-                         lw=0, alpha=1 if name in ("tower", "wire") else 0.6)  # fmt: skip
+            axis.scatter(x[member], y[member], z[member], c=ROLE_COLOURS[name], s=size, marker="s",
+                         lw=0, alpha=1 if name in ("tower", "conductor") else 0.6)  # fmt: skip
         axis.set_title(title, y=0.98, fontsize=11)
         for side in (axis.xaxis, axis.yaxis, axis.zaxis):
             side.set_ticklabels([])
@@ -137,7 +135,7 @@ def voxel_grids(grids: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | P
     shown = {name for _, names in grids.values() for name in names}
     handles = [
         figure.axes[0].plot([], [], [], "s", c=colour, ms=7, label=name)[0]
-        for name, colour in CLASS_COLOURS.items()
+        for name, colour in ROLE_COLOURS.items()
         if name in shown
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False,
@@ -194,7 +192,7 @@ def labelled_survey(xyz: np.ndarray, names: np.ndarray, out: str | Path) -> str:
 
     Args:
         xyz: (N, 3) m, thinned for drawing.
-        names: (N,) of ``CLASS_COLOURS``.
+        names: (N,) of ``ROLE_COLOURS``.
         out: PNG to write.
     """
     along, across = ((xyz[:, :2] - xyz[:, :2].mean(axis=0)) @ principal_axes(xyz[:, :2])).T
@@ -206,11 +204,11 @@ def labelled_survey(xyz: np.ndarray, names: np.ndarray, out: str | Path) -> str:
     top.set(ylabel="across the line [m]")
     side.set(xlabel="along the line [m]", ylabel="elevation [m]")
     handles, labels = side.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(CLASS_COLOURS),
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(ROLE_COLOURS),
                   frameon=False, markerscale=4, fontsize=9)  # fmt: skip
     save(figure, out)
     shares = ", ".join(
-        f"{name} {100 * (names == name).mean():.1f} %" for name in CLASS_COLOURS
+        f"{name} {100 * (names == name).mean():.1f} %" for name in ROLE_COLOURS
         if (names == name).any()
     )  # fmt: skip
     return f"The survey from above and from the side over {np.ptp(along):.0f} m. Drawn: {shares}."
@@ -229,8 +227,8 @@ def _side(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _scatter_classes(axis: Axes, along: np.ndarray, height: np.ndarray, names: np.ndarray) -> None:
-    for name in reversed(list(CLASS_COLOURS)):
+    for name in reversed(list(ROLE_COLOURS)):
         member = names == name
         if member.any():
-            axis.scatter(along[member], height[member], s=2, lw=0, c=CLASS_COLOURS[name],
+            axis.scatter(along[member], height[member], s=2, lw=0, c=ROLE_COLOURS[name],
                          label=name, rasterized=True)  # fmt: skip

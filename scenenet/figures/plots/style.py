@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.core.files import atomic
+from scenenet.pointcloud.class_schemes import ROLE_COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +19,7 @@ DPI = 130
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#666666")
 """Told apart by colour-blind readers as well (Okabe and Ito)."""
 
-TOWER_COLOUR = "#D62728"
+TOWER_COLOUR = ROLE_COLOURS["tower"]
 
 
 def new_figure(

@@ -8,29 +8,22 @@ from pathlib import Path
 import numpy as np
 
 from scenenet.figures.plots.point_clouds import principal_axes
-from scenenet.figures.plots.style import TOWER_COLOUR, new_figure, save
-
-KINDS = {"ground": "#A98B6D", "low": "#A6C36F", "tall": "#2F7D4F", "stray": "#CC79A7",
-         "other": "#B5BAC1", "wire": "#E69F00", "tower": TOWER_COLOUR}  # fmt: skip
-"""What a point may be -> its colour; later ones are drawn over earlier ones."""
-
-EDP_KINDS = {2: "ground", 10: "ground", 19: "ground", 9: "ground", 3: "low", 4: "low", 11: "low",
-             5: "tall", 12: "tall", 7: "stray", 16: "wire", 17: "wire", 15: "tower"}  # fmt: skip
-"""EDP codes as the public TS40K crops use them (docs/method/synthetic.md)."""
+from scenenet.figures.plots.style import new_figure, save
+from scenenet.pointcloud.class_schemes import LOOK_COLOURS
 
 
 def crops_beside(crops: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | Path) -> str:
     """Every crop from the side, along its line, and from above; all panels have the same scale.
 
     Args:
-        crops: title -> ((N, 3) m, (N,) names of ``KINDS``).
+        crops: title -> ((N, 3) m, (N,) keys of ``LOOK_COLOURS``).
         out: PNG to write.
 
     Returns:
         its alternative text.
     """
     turned = {
-        title: (_turned(xyz, kinds == "wire"), kinds) for title, (xyz, kinds) in crops.items()
+        title: (_turned(xyz, kinds == "conductor"), kinds) for title, (xyz, kinds) in crops.items()
     }
     half = max(float(np.abs(xyz[:, :2]).max()) for xyz, _ in turned.values()) + 1
     wide = max(float(np.abs(xyz[:, 1]).max()) for xyz, _ in turned.values()) + 1
@@ -45,7 +38,7 @@ def crops_beside(crops: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | 
         height_ratios=[top, 2 * wide],
     )
     for (title, (xyz, kinds)), (side, above) in zip(turned.items(), axes.T, strict=True):
-        for kind, colour in KINDS.items():
+        for kind, colour in LOOK_COLOURS.items():
             member = kinds == kind
             style = {"s": 0.6 if kind != "tower" else 1.4, "lw": 0, "c": colour, "rasterized": True}
             side.scatter(xyz[member, 0], xyz[member, 2], **style)
@@ -58,8 +51,8 @@ def crops_beside(crops: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | 
     for axis in axes[:, 1:].flat:
         axis.set_yticklabels([])
     dots = [axes[0, 0].plot([], [], "o", ms=5, c=colour, label=kind)[0]
-            for kind, colour in KINDS.items()]  # fmt: skip
-    figure.legend(handles=dots, loc="outside lower center", ncols=len(KINDS), frameon=False,
+            for kind, colour in LOOK_COLOURS.items()]  # fmt: skip
+    figure.legend(handles=dots, loc="outside lower center", ncols=len(LOOK_COLOURS), frameon=False,
                   fontsize=9)  # fmt: skip
     save(figure, out)
     titles = ", ".join(title.replace("\n", " ") for title in crops)
@@ -69,16 +62,10 @@ def crops_beside(crops: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | 
     )
 
 
-def kinds_of(codes: np.ndarray) -> np.ndarray:
-    """What points with EDP codes (N,) are, (N,) names of ``KINDS``."""
-    names = np.array([EDP_KINDS.get(code, "other") for code in range(256)])
-    return names[codes]
-
-
-def _turned(xyz: np.ndarray, wire: np.ndarray) -> np.ndarray:
+def _turned(xyz: np.ndarray, conductor: np.ndarray) -> np.ndarray:
     """Points (N, 3) about the middle of the crop; the first axis runs along the points that are
-    ``wire`` (N,), where there are enough, else where the crop spreads most."""
-    line = wire if wire.sum() > 30 else np.ones(len(xyz), bool)
+    ``conductor`` (N,), where there are enough, else where the crop spreads most."""
+    line = conductor if conductor.sum() > 30 else np.ones(len(xyz), bool)
     middle = (xyz.min(axis=0) + xyz.max(axis=0)) / 2
     across = (xyz[:, :2] - middle[:2]) @ principal_axes(xyz[line, :2])
     return np.column_stack((across, xyz[:, 2] - xyz[:, 2].min()))

@@ -27,7 +27,7 @@ for (const table of document.querySelectorAll("table")) {
   });
 }
 
-const CLASS_COLOURS = { other: "#9aa5b1", ground: "#b08d57", vegetation: "#4c9a4c", wire: "#0072b2", tower: "#d62728" };
+const CLASS_COLOURS = { other: "#9aa5b1", ground: "#b08d57", vegetation: "#4c9a4c", conductor: "#0072b2", tower: "#d62728" };
 const FOUND_COLOURS = { right: "#009e73", wrong: "#e69f00", missed: "#cc79a7", nothing: "#9aa5b133" };
 
 function unpack(text, Kind) {

@@ -11,11 +11,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from scenenet.synthetic.codes import LOW, TALL, TALL_M
 from scenenet.synthetic.returns.flight import Flight
 from scenenet.synthetic.scene.random_fields import Raster
 from scenenet.synthetic.scene.strip import Strip
 from scenenet.synthetic.scene.towers import place, sample
-from scenenet.synthetic.settings import LOW, TALL, TALL_M, SyntheticSettings
+from scenenet.synthetic.settings import SyntheticSettings
 
 CLEAR_M = 6.0
 """Distance from the towers at the ends of a strip, and from the line for what is tall."""

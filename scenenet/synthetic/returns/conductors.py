@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenenet.synthetic.codes import CONDUCTOR, TALL
 from scenenet.synthetic.returns.flight import Flight
 from scenenet.synthetic.scene.line import Support
 from scenenet.synthetic.scene.random_fields import Raster
 from scenenet.synthetic.scene.strip import Strip
-from scenenet.synthetic.settings import TALL, WIRE, SyntheticSettings
+from scenenet.synthetic.settings import SyntheticSettings
 
 BUNDLE_M = 0.4
 """Distance of the wires of a bundle."""
@@ -105,7 +106,7 @@ def wire_points(
         window,
     )
     points += 0.7 * settings.ranging_noise * rng.standard_normal(points.shape)
-    return points, np.full(len(points), WIRE, np.uint8)
+    return points, np.full(len(points), CONDUCTOR, np.uint8)
 
 
 def other_cables(

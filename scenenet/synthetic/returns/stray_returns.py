@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenenet.synthetic.codes import STRAY
 from scenenet.synthetic.returns.flight import Flight
 from scenenet.synthetic.scene.random_fields import Raster
 from scenenet.synthetic.scene.strip import Strip
-from scenenet.synthetic.settings import STRAY, SyntheticSettings
+from scenenet.synthetic.settings import SyntheticSettings
 
 NEAR_FLIGHT = 0.85
 """Share of the strays in the air that lie below the helicopter; the rest are anywhere."""

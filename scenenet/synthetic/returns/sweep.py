@@ -5,19 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from scenenet.synthetic.returns.pulse import (
-    BORDER_M,
-    CEILING_CELL_M,
-    FOLIAGE,
-    FOLIAGE_CELL_M,
-    GOES_ON,
-    GRASS_M,
-    MOST_RETURNS,
-    STEP_M,
-    WATER_RETURNS,
-)
-from scenenet.synthetic.scene.hashing import next_state, uniform
-from scenenet.synthetic.settings import (
+from scenenet.synthetic.codes import (
     BARE,
     BARE_TOO,
     GRASS,
@@ -31,6 +19,18 @@ from scenenet.synthetic.settings import (
     UNCLASSIFIED,
     WATER,
 )
+from scenenet.synthetic.returns.pulse import (
+    BORDER_M,
+    CEILING_CELL_M,
+    FOLIAGE,
+    FOLIAGE_CELL_M,
+    GOES_ON,
+    GRASS_M,
+    MOST_RETURNS,
+    STEP_M,
+    WATER_RETURNS,
+)
+from scenenet.synthetic.scene.hashing import next_state, uniform
 
 
 @numba.njit(nogil=True, cache=True, inline="always")

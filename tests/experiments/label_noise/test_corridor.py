@@ -9,7 +9,7 @@ from scenenet.core.errors import InputError
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.experiments.label_noise.corridor import noisy_lines
 from scenenet.synthetic import corridor_cloud, make_corridor
-from scenenet.synthetic.settings import TOWER
+from scenenet.synthetic.codes import TOWER
 
 GRID = VoxelSettings(resolution=32)
 

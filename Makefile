@@ -12,7 +12,7 @@ reproduce: $(INSTALLED)  ## all results of the default configuration, under resu
 	$(VENV)/bin/snakemake --cores $(CORES)
 
 test: $(INSTALLED)  ## the tests
-	$(VENV)/bin/python -m pytest -n $(CORES) --dist loadgroup
+	$(VENV)/bin/python -m pytest -n $(CORES) --no-loadscope-reorder
 
 package: $(INSTALLED)  ## build the package, install it in a fresh environment and predict with it
 	$(VENV)/bin/python -m pytest -m packaging

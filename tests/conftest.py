@@ -35,18 +35,27 @@ pytest_plugins = ["fixtures.noisy_lines", "fixtures.result_folder"]
 ROOT = Path(__file__).resolve().parent.parent
 
 
-@pytest.hookimpl(tryfirst=True)  # before xdist reads the groups
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Share the tests out among workers so that no fixture of a session is made twice.
+def _group(file: str) -> str:
+    """The tests of the workflow share one finished run; those of any other file share its
+    fixtures."""
+    return "workflow" if file.startswith("tests/workflow/") else file
 
-    The tests of the workflow share one finished run, so one worker takes them all; it begins with
-    them, because they take the longest. The tests of any other file stay together.
-    """
-    items.sort(key=lambda item: item.path.parent.name != "workflow")
-    for item in items:
-        place = item.path.relative_to(ROOT / "tests")
-        group = place.parts[0] if place.parts[0] == "workflow" else place.as_posix()
-        item.add_marker(pytest.mark.xdist_group(group))
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the tests of the workflow, which take the longest."""
+    items.sort(key=lambda item: _group(item.nodeid) != "workflow")
+
+
+@pytest.hookimpl(optionalhook=True)  # pytest-xdist may be missing
+def pytest_xdist_make_scheduler(config: pytest.Config, log):
+    """Give each group to one worker, so that no fixture of a session is made twice."""
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByGroup(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return _group(nodeid.split("::")[0])
+
+    return ByGroup(config, log)
 
 
 PLACE = np.array([500_000.0, 4_630_000.0, 100.0])

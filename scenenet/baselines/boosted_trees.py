@@ -106,7 +106,7 @@ class BoostedTrees:
     def probabilities(self, sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid.
 
-        As ``scenenet.models.answers.probabilities`` has it for the other models.
+        As ``scenenet.models.predictions.probabilities`` has it for the other models.
         """
         return sample.spread(self.of_occupied(sample))
 

@@ -22,8 +22,8 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.crop_towers import crop_towers
 from scenenet.evaluation.scoring import score
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
-from scenenet.models.answers import probabilities
 from scenenet.models.model_file import read_model, write_model
+from scenenet.models.predictions import probabilities
 from scenenet.models.settings import ModelSettings, TuningSettings
 from scenenet.pointcloud.ts40k import sample_files
 from scenenet.prediction.predict import predict_survey

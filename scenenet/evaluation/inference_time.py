@@ -15,8 +15,8 @@ from scenenet.core.progress import track
 from scenenet.dataset.crops import read_crops
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
-from scenenet.models.answers import probabilities
 from scenenet.models.model_file import read_model
+from scenenet.models.predictions import probabilities
 
 RESOLUTIONS = (64, 128)
 """Voxels an edge: the thesis' grid, and the finer one of its 5.2.7."""

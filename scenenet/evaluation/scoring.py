@@ -20,10 +20,9 @@ from scenenet.evaluation.crop_towers import _match, find_in_crop
 from scenenet.metrics.threshold_curve import ThresholdCurve, curve_columns
 from scenenet.metrics.tower_matching import TowerMatch
 from scenenet.metrics.voxel_scores import Confusion, confusion
-from scenenet.models.answers import probabilities
 from scenenet.models.base import VoxelModel
 from scenenet.models.model_file import ModelCard, read_model
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.predictions import probabilities
 
 
 def evaluate(
@@ -48,9 +47,14 @@ def score(
     def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         return probabilities(model, sample, card.measurement)
 
-    whole = isinstance(model, SceneNet) and model.metric is not None and model.metric.whole_towers
     return score_answers(
-        card.name, seed, card.threshold(), answer, dataset, detection, whole_towers=whole
+        card.name,
+        seed,
+        card.threshold(),
+        answer,
+        dataset,
+        detection,
+        whole_towers=model.whole_towers,
     )
 
 

@@ -20,11 +20,11 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.crop_towers import find_in_crop
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.metrics.voxel_scores import Confusion, confusion
-from scenenet.models.answers import probabilities, threshold_curve
 from scenenet.models.factory import new_model
+from scenenet.models.predictions import probabilities
 from scenenet.models.settings import ModelSettings
-from scenenet.training.objective import best_step
 from scenenet.training.train import LostTraining, fit
+from scenenet.training.tuning import tuned_tau
 
 Answer = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
 """Probability (V,) and truth (V,) of all voxels of a sample."""
@@ -109,17 +109,9 @@ def train_model(
         print(error, file=sys.stderr)
         n, seconds = new_model(settings, seed).n_parameters(), time.perf_counter() - begin
         return TunedModel(_nothing, float(THRESHOLDS[-1]), 0.0, n, seconds)
-    if model.metric is None:
-        curve = threshold_curve(model, validation or training, settings.measurement)
-        tau, counts = curve.best()
-    else:
-        # As in ``scenenet.training.tuning``: eleven numbers hardly know their crops by heart.
-        both = [*training, *validation]
-        step, _ = best_step(
-            threshold_curve(model, both, settings.measurement), model.metric.false_weight
-        )
-        curve = threshold_curve(model, validation or training, settings.measurement)
-        tau, counts = float(curve.tau[step]), curve.confusion(step)
+    others = training if validation else ()
+    tau, curve = tuned_tau(model, validation or training, others, settings.measurement)
+    counts = curve.at(tau)
 
     def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         return probabilities(model, sample, settings.measurement)

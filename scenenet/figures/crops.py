@@ -81,8 +81,8 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
     from scenenet.dataset.voxels import VoxelGrid, voxelise
     from scenenet.figures.plots.grids import GridView, truth_and_answer
     from scenenet.metrics.voxel_scores import confusion
-    from scenenet.models.answers import probabilities
     from scenenet.models.model_file import read_model
+    from scenenet.models.predictions import probabilities
 
     champion = champion_of(results, model)
     sample = ranked(champion, "median")
@@ -100,7 +100,7 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         said.append(
             f"at {resolution}³ precision {counts.precision:.2f} and recall {counts.recall:.2f}"
         )
-    trained_on = "in metres" if trained.metric else "in voxels, as many on both grids"
+    trained_on = {"m": "in metres", "voxel": "in voxels, as many on both grids"}[trained.units]
     return truth_and_answer(views, card.threshold(), out), (
         f"Crop {sample['id']}, the middle one of the test crops by F0.5 of {model}, on two grids: "
         f"what is labelled tower, what {model} (seed {champion.seed}) answers, and where that is "
@@ -115,8 +115,8 @@ def _probability(cloud: PointCloud, champion: SeedResult) -> View:
     """The answer of a model to a crop, on the grid it was trained on."""
     from scenenet.dataset.voxels import VoxelSettings, voxelise
     from scenenet.figures.plots.point_clouds import View
-    from scenenet.models.answers import probabilities
     from scenenet.models.model_file import read_model
+    from scenenet.models.predictions import probabilities
 
     model, card = read_model(champion.model_files[0])
     settings = VoxelSettings(fit=card.fit, resolution=card.resolution, voxel_size=card.voxel_size)

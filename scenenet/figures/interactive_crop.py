@@ -59,8 +59,8 @@ def write_scene(
     )
     from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
     from scenenet.metrics.voxel_scores import confusion
-    from scenenet.models.answers import probabilities
     from scenenet.models.model_file import read_model
+    from scenenet.models.predictions import probabilities
 
     champion = champion_of(results, model)
     sample = ranked(champion, rank)
@@ -105,9 +105,9 @@ def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) ->
 
     from scenenet.convolution.convolve import convolve_at_voxels
     from scenenet.dataset.batches import batch
-    from scenenet.models.scenenet import SceneNet
+    from scenenet.models.geneo_model import GeneoModel
 
-    if not isinstance(model, SceneNet):
+    if not isinstance(model, GeneoModel):
         return {}
     model = model.at(voxels.grid.voxel_size)
     occupancy, _ = batch([voxels], measurement)

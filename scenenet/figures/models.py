@@ -66,17 +66,16 @@ def draw_paths(results: Results, model: str, out: Path) -> tuple[str, str]:
 
 def draw_kernels(results: Results, model: str, out: Path) -> tuple[str, str]:
     from scenenet.figures.plots.parameters import kernels
+    from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
-    from scenenet.models.scenenet import SceneNet
     from scenenet.results.initial_models import start_of
 
     champion = champion_of(results, model)
     trained, _ = read_model(champion.model_files[0])
     start = start_of(champion, trained)
-    metres = trained.voxel_size if isinstance(trained, SceneNet) and trained.metric else None
-    alt = kernels(_slices(trained), out, start and _slices(start.model), metres)
+    alt = kernels(_slices(trained), out, start and _slices(start.model), trained.voxel_size)
     before = "" if start is None else f"The rows above are those {start.said}. "
-    figures = "As thesis Figures 4.2 to 4.4." if isinstance(trained, SceneNet) else ""
+    figures = "As thesis Figures 4.2 to 4.4." if isinstance(trained, GeneoModel) else ""
     return alt, (
         f"Slices through the middle of each kernel of {model}, seed {champion.seed} (best on "
         "validation). Red adds to the answer where a voxel is occupied, blue takes away. Each "
@@ -89,12 +88,12 @@ def _slices(model: VoxelModel) -> dict[str, np.ndarray]:
     import torch
 
     from scenenet.models.cnn import CNN
-    from scenenet.models.scenenet import SceneNet
+    from scenenet.models.geneo_model import GeneoModel
 
     parts: dict[str, np.ndarray] = {}
     with torch.no_grad():
         summed, _ = model.observer()
-        if isinstance(model, SceneNet):
+        if isinstance(model, GeneoModel):
             parts = dict(zip(model.names, model.kernels().numpy(), strict=True))
         elif isinstance(model, CNN):
             parts = {f"kernel {i + 1}": k.numpy() for i, k in enumerate(model.weight)}

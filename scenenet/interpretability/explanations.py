@@ -10,8 +10,8 @@ from typing import Any
 from scenenet.detection.conductors import FAR
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
+from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import ModelCard
-from scenenet.models.scenenet import SceneNet
 
 SILENT = 0.01
 """A GENEO with a smaller share said nothing that a person would want to read."""
@@ -106,14 +106,14 @@ def meanings(model: VoxelModel, card: ModelCard) -> list[tuple[str, float, str, 
 
     Lengths are in metres too, at the voxel size that surveys are predicted at.
     """
-    if not isinstance(model, SceneNet):
+    if not isinstance(model, GeneoModel):
         return []
     values = model.shape_parameters()
     rows = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         for parameter in kernel_named(geneo).parameters:
             value = values[f"{name}.{parameter.name}"]
-            unit = parameter.unit
+            unit = model.unit_of(parameter)
             if unit == "voxel":
                 unit = f"voxel = {value * card.voxel_size:.2f} m"
             rows.append((f"{name} {parameter.name}", value, unit, parameter.meaning))

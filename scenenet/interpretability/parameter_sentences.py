@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from scenenet.geneo import ShapeParameter
     from scenenet.geneo.sentences import Numbers, Surroundings
-    from scenenet.models.scenenet import SceneNet
+    from scenenet.models.geneo_model import GeneoModel
 
 
 class Parameter(NamedTuple):
@@ -31,7 +31,7 @@ class Parameter(NamedTuple):
     factor: float
 
 
-def parameters_of(model: SceneNet, voxel_size: float) -> list[Parameter]:
+def parameters_of(model: GeneoModel, voxel_size: float) -> list[Parameter]:
     """The numbers of a model in the order of ``SceneNet.shape_parameters``.
 
     Args:
@@ -40,21 +40,18 @@ def parameters_of(model: SceneNet, voxel_size: float) -> list[Parameter]:
     # Here, because who only wants to know which tables there are need not wait for torch.
     from scenenet.geneo import kernel_named
 
+    metres = model.length_unit_m(voxel_size)
     found = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         for parameter in kernel_named(geneo).parameters:
-            factor = _metres(parameter, voxel_size) if model.metric is None else 1.0
+            factor = {"voxel": metres, "voxel^2": metres**2}.get(parameter.unit, 1.0)
             label = f"{name}.{parameter.name}"
             found.append(Parameter(label, parameter.name, parameter.metric_unit, factor))
     return found + [Parameter(f"lambda.{name}", "lambda", "1", 1.0) for name in model.names]
 
 
-def _metres(parameter: ShapeParameter, voxel_size: float) -> float:
-    return {"voxel": voxel_size, "voxel^2": voxel_size**2}.get(parameter.unit, 1.0)
-
-
 def sentences(
-    model: SceneNet, values: Mapping[str, float], beside: Surroundings | None = None
+    model: GeneoModel, values: Mapping[str, float], beside: Surroundings | None = None
 ) -> dict[str, str]:
     """What each number says.
 

@@ -1,16 +1,19 @@
-"""What every model of voxels has in common (thesis 4.3)."""
+"""What all voxel models have in common (thesis 4.3)."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Self
+from collections.abc import Sequence
+from typing import ClassVar, Self
 
 import numpy as np
 from torch import Tensor, nn
 
 from scenenet.convolution.observer import observe
 from scenenet.convolution.occupancy import Occupancy
-from scenenet.models.settings import KernelSize, MetricSettings
+from scenenet.core.errors import InputError
+from scenenet.metrics.threshold_curve import ThresholdCurve
+from scenenet.models.settings import KernelSize
 
 
 class VoxelModel(nn.Module):
@@ -18,28 +21,59 @@ class VoxelModel(nn.Module):
 
     Attributes:
         kind: name of the architecture in model files and tables.
+        units: ``voxel`` or ``m``, what the kernels are defined in.
+        tau_from_training: whether tau is chosen on the training crops as well as on validation.
         kernel_size: (kz, ky, kx) in voxels.
-        metric: lengths of a model in metres; None where kernels are in voxels.
+        voxel_size: m, edge of the voxels that the kernels are sampled at; None where they are
+            defined in voxels.
     """
 
-    kind: str
+    kind: ClassVar[str]
+    units: ClassVar[str] = "voxel"
+    tau_from_training: ClassVar[bool] = False
     kernel_size: KernelSize
-    metric: MetricSettings | None = None
+    voxel_size: float | None = None
 
     def at(self, voxel_size: float) -> Self:
-        """The model for voxels of ``voxel_size`` m, sharing its numbers; itself where its kernels
-        are in voxels."""
+        """The model for voxels of ``voxel_size`` m, which shares the trained numbers; the model
+        itself where its kernels are in voxels."""
         return self
+
+    def observed_size(self, voxel_size: float) -> float:
+        """Edge in m of the voxels or blocks of voxels through which the model observes a grid of
+        ``voxel_size`` m."""
+        return voxel_size
+
+    @property
+    def whole_towers(self) -> bool:
+        """Whether the model predicts whole towers instead of the voxels at or above tau."""
+        return False
+
+    def best_tau(self, curve: ThresholdCurve) -> float:
+        """The threshold tau to use after tuning on crops with this ``curve``."""
+        return curve.best()[0]
+
+    def with_kernel_size(self, kernel_size: KernelSize) -> Self:
+        """The same parameters sampled at another size (thesis 5.2.7).
+
+        Raises:
+            InputError: the model only has the size it was trained with.
+        """
+        raise InputError(f"a {self.kind} only has the kernel size it was trained with")
+
+    def with_kernel_sizes(self, sizes: Sequence[KernelSize]) -> list[Self]:
+        """The model at each of ``sizes`` other than its own; none if it only has one size."""
+        return []
 
     @property
     def reach(self) -> tuple[int, int, int]:
-        """Voxels (z, y, x) to each side of a voxel that its answer depends on."""
+        """Voxels (z, y, x) to each side of a voxel that influence its probability."""
         kz, ky, kx = self.kernel_size
         return kz // 2, ky // 2, kx // 2
 
     def argmax_rows(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
-        """(M,) row of the occupied voxel whose observation each one's answer is; its own unless
-        the model looks at whole sections of a tower.
+        """(M,) row of the occupied voxel whose response each one takes; its own row unless the
+        model works on cross-sections.
 
         Args:
             observed: (M,) H at the occupied voxels.
@@ -48,10 +82,10 @@ class VoxelModel(nn.Module):
 
     @abstractmethod
     def observer(self) -> tuple[Tensor, Tensor | None]:
-        """The summed kernel (kz, ky, kx) and the bias (), None for a model without."""
+        """The summed kernel (kz, ky, kx) and the bias (), None for a model without bias."""
 
     def forward(self, occupancy: Occupancy) -> Tensor:
-        """Probability of each voxel to hold a tower: (tanh(H(x)))_+, (B, D, H, W) in [0, 1]."""
+        """Probability that each voxel is part of a tower, (tanh H)_+, (B, D, H, W) in [0, 1]."""
         return observe(occupancy, *self.observer())
 
     def n_parameters(self) -> int:

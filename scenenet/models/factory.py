@@ -6,6 +6,7 @@ import torch
 
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import ModelSettings
 
@@ -15,5 +16,6 @@ def new_model(settings: ModelSettings, seed: int) -> VoxelModel:
     generator = torch.Generator().manual_seed(seed)
     if settings.kind == "cnn":
         return CNN(settings.n_kernels, settings.kernel_size, generator=generator)
-    metric = settings.metric if settings.protocol == "operational" else None
-    return SceneNet(settings.geneos, settings.kernel_size, metric=metric, generator=generator)
+    if settings.protocol == "operational":
+        return MetricSceneNet(settings.geneos, settings.metric, generator=generator)
+    return SceneNet(settings.geneos, settings.kernel_size, generator=generator)

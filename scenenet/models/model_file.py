@@ -16,6 +16,8 @@ from scenenet.dataset.voxels import Fit, Measurement
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
+from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import KernelSize, MetricSettings
 
@@ -70,14 +72,14 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
     model = model.at(card.voxel_size)
     head = {
         "format": FORMAT,
-        "format_version": FORMAT_VERSION if model.metric is None else METRIC_VERSION,
+        "format_version": METRIC_VERSION if model.units == "m" else FORMAT_VERSION,
         "kind": model.kind,
         "kernel_size": list(model.kernel_size),
         **card.model_dump(),
     }
     if Path(path).suffix != suffix(model.kind):
         raise ValueError(f"a {model.kind} is kept in *{suffix(model.kind)}, not {path}")
-    if isinstance(model, SceneNet):
+    if isinstance(model, GeneoModel):
         write_json(path, head | _numbers(model))
         return
     from safetensors.torch import save_file
@@ -110,34 +112,34 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
         ) from None
 
 
-def _numbers(model: SceneNet) -> dict[str, Any]:
+def _numbers(model: GeneoModel) -> dict[str, Any]:
     """The parameters of a SCENE-Net as a person would write them down."""
     values = model.shape_parameters()
-    metric = model.metric is not None
     geneos = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         parameters = {
             p.name: {
                 "value": values[f"{name}.{p.name}"],
-                "unit": p.metric_unit if metric else p.unit,
+                "unit": model.unit_of(p),
                 "meaning": p.meaning,
             }
             for p in kernel_named(geneo).parameters
         }
         geneos.append({"name": name, "kernel": geneo, "parameters": parameters})
     mixing = {name: values[f"lambda.{name}"] for name in model.names}
-    numbers = {"units": "voxel", "geneos": geneos, "mixing_weights": mixing}
-    if model.metric is None:
-        return numbers
-    return numbers | {"units": "m", "metric": model.metric.model_dump()}
+    lengths = {"metric": model.metric.model_dump()} if isinstance(model, MetricSceneNet) else {}
+    return {"units": model.units, "geneos": geneos, "mixing_weights": mixing} | lengths
 
 
-def _read_scenenet(data: Mapping[str, Any]) -> tuple[SceneNet, ModelCard]:
+def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
     _check_head(data)
     geneos = [entry["kernel"] for entry in data["geneos"]]
     key = {METRIC_VERSION: "metric", FIELD_VERSION: "field"}.get(data["format_version"])
-    metric = None if key is None else MetricSettings(**data[key])
-    model = SceneNet(geneos, _size(data), metric=metric)
+    model: GeneoModel
+    if key is None:
+        model = SceneNet(geneos, _size(data))
+    else:
+        model = MetricSceneNet(geneos, MetricSettings(**data[key]))
     numbers = {
         f"{entry['name']}.{symbol}": float(parameter["value"])
         for entry in data["geneos"]

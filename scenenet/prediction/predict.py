@@ -48,17 +48,14 @@ def predict_survey(
     Raises:
         InputError: the survey or the model cannot be used.
     """
-    from scenenet.convolution.coarsening import block_edge
+    from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
-    from scenenet.models.scenenet import SceneNet
 
     begin = time.perf_counter()
     trained, card = read_model(model)
     tau = card.threshold()  # before the work: a model without one cannot say what a tower is
-    geneos = trained.names if isinstance(trained, SceneNet) else []
-    voxel_size = settings.voxel_size or card.voxel_size
-    if trained.metric is not None:
-        voxel_size *= block_edge(voxel_size)
+    geneos = trained.names if isinstance(trained, GeneoModel) else []
+    voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
     name, crs = Path(path).name, survey_in_metres(path).crs
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
         spool = TileSpool(Path(scratch), voxel_size)

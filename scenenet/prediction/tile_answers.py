@@ -177,7 +177,7 @@ def answer_tile(
 
     from scenenet.convolution.convolve import convolve_at_voxels
     from scenenet.convolution.occupancy import Occupancy
-    from scenenet.models.scenenet import SceneNet
+    from scenenet.models.geneo_model import GeneoModel
 
     model = model.at(spool.voxel_size)
     reach = model.reach
@@ -188,7 +188,7 @@ def answer_tile(
     occupancy = Occupancy.of_grids([scene.voxel], phi, shape)
     inner = _inner(scene.voxel, shape, reach)
     with torch.no_grad():
-        if isinstance(model, SceneNet):
+        if isinstance(model, GeneoModel):
             parts = convolve_at_voxels(occupancy, model.weighted_kernels())
             # Reasons are those of the voxel whose answer it is.
             rows = model.argmax_rows(occupancy, parts.sum(dim=0))[inner]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 from pydantic import ValidationError
 
-from scenenet.models.settings import KernelSize, ModelSettings
+from scenenet.models.settings import ModelSettings
 from scenenet.results.folder import SeedResult, parameter_columns
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
-    from scenenet.models.scenenet import SceneNet
 
 DRAWN = "drawn from the seed, as training began with them"
 FIRST_STEP = "after the first step of the training, the earliest that is kept"
@@ -35,6 +35,7 @@ def start_of(result: SeedResult, trained: VoxelModel) -> Start | None:
         trained: what came out, whose kernel size the start is sampled at.
     """
     from scenenet.models.factory import new_model
+    from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.scenenet import SceneNet
 
     settings = _settings(result)
@@ -46,14 +47,14 @@ def start_of(result: SeedResult, trained: VoxelModel) -> Start | None:
         if isinstance(drawn, SceneNet):
             drawn = drawn.with_kernel_size(trained.kernel_size)
         return Start(drawn, DRAWN)
-    if not isinstance(trained, SceneNet) or result.history is None or result.history.empty:
+    if not isinstance(trained, GeneoModel) or result.history is None or result.history.empty:
         return None
     names = parameter_columns(result.history)
     numbers = {name: float(result.history[name].iloc[0]) for name in names}
     known = trained.shape_parameters()
     if not known.keys() <= numbers.keys():
         return None
-    first = _like(trained, trained.kernel_size)
+    first = copy.deepcopy(trained)
     first.set_shape_parameters({name: numbers[name] for name in known})
     return Start(first, FIRST_STEP)
 
@@ -65,8 +66,3 @@ def _settings(result: SeedResult) -> ModelSettings | None:
         return ModelSettings(**recorded)
     except (ValidationError, TypeError):
         return None
-
-
-def _like(trained: SceneNet, size: KernelSize) -> SceneNet:
-    other = type(trained)(trained.geneos, size, metric=trained.metric)
-    return other.at(trained.voxel_size)

@@ -17,7 +17,7 @@ from scenenet.results.initial_models import start_of
 if TYPE_CHECKING:
     import pandas as pd
 
-    from scenenet.models.scenenet import SceneNet
+    from scenenet.models.geneo_model import GeneoModel
 
 SYMBOLS = {"sigma": "σ", "beta": "β", "omega": "ω", "lambda": "λ"}
 """Names of parameters -> how the thesis writes them."""
@@ -116,7 +116,7 @@ class Numbers(NamedTuple):
         step: m, what the height of a kernel is counted in.
     """
 
-    network: SceneNet
+    network: GeneoModel
     parameters: list[Parameter]
     after: pd.DataFrame
     before: pd.DataFrame
@@ -128,25 +128,25 @@ def numbers_in_metres(results: Results, model: str) -> Numbers | None:
     """The numbers of one SCENE-Net; None where it has no tuned file, or is none."""
     import pandas as pd
 
+    from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
-    from scenenet.models.scenenet import SceneNet
 
     after, before, began, sizes = [], [], set(), []
     network, known = None, []
     for result in results.of_model(model):
         trained, card = read_model(result.model_files[0]) if result.model_files else (None, None)
-        if not isinstance(trained, SceneNet) or card is None:
+        if not isinstance(trained, GeneoModel) or card is None:
             continue
         network, known = trained, parameters_of(trained, card.voxel_size)
         after.append(_scaled_all(known, trained.shape_parameters()))
         sizes.append(card.voxel_size)
         start = start_of(result, trained)
-        if start is not None and isinstance(start.model, SceneNet):
+        if start is not None and isinstance(start.model, GeneoModel):
             before.append(_scaled_all(known, start.model.shape_parameters()))
             began.add(start.said)
     if network is None:
         return None
-    step = 1.0 if network.metric is not None else sum(sizes) / len(sizes)
+    step = network.length_unit_m(sum(sizes) / len(sizes))
     said = "; ".join(sorted(began))
     return Numbers(network, known, pd.DataFrame(after), pd.DataFrame(before), said, step)
 

@@ -30,6 +30,7 @@ from scenenet.metrics.voxel_scores import BETA
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
 from scenenet.models.factory import new_model
+from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import KernelSize, ModelSettings
 
@@ -49,15 +50,15 @@ def starting_model(
     if init == "informed":
         return informed_model(settings, seed, training)
     model = new_model(settings, seed)
-    if isinstance(model, SceneNet) and init == "unranged":
+    if isinstance(model, GeneoModel) and init == "unranged":
         generator = torch.Generator().manual_seed(seed)
         model.set_numbers(torch.randn(model.n_parameters(), generator=generator).numpy())
-    if isinstance(model, SceneNet) and init == "handcrafted":
+    if isinstance(model, GeneoModel) and init == "handcrafted":
         model.set_shape_parameters(handcrafted(model))
     return model
 
 
-def handcrafted(model: SceneNet) -> dict[str, float]:
+def handcrafted(model: GeneoModel) -> dict[str, float]:
     """Numbers that were set by hand, by name: the kernels' own (``ShapeParameter.handcrafted``),
     and every kernel with the same weight."""
     shapes = {

@@ -12,7 +12,7 @@ from torch import Tensor
 from scenenet.convolution.observer import squared_error
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.models.base import VoxelModel
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.settings import LossSettings
 from scenenet.training.cross_entropy import cross_entropy
 
@@ -79,7 +79,7 @@ def negativity(model: VoxelModel, settings: LossSettings) -> Tensor:
     h is the one of ``PENALTIES`` that ``settings`` name. A model without shape parameters has
     nothing to penalise.
     """
-    if not isinstance(model, SceneNet):
+    if not isinstance(model, GeneoModel):
         return torch.zeros(())
     h = PENALTIES[settings.penalty]
     shapes = torch.stack([v for name in model.names for v in model.shape_of(name).values()])

@@ -15,12 +15,12 @@ import pandas as pd
 from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample
-from scenenet.models.answers import Scene, curve_of, scenes_of
 from scenenet.models.factory import new_model
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.metric_scenenet import MetricSceneNet
+from scenenet.models.predictions import Scene, curve_of, scenes_of
 from scenenet.models.settings import ModelSettings, SearchSettings
 from scenenet.training.cma_es import Score, State, advance, begin, settled
-from scenenet.training.objective import best_step, draws, scorer
+from scenenet.training.objective import draws, scorer
 
 
 def search_metric(
@@ -31,7 +31,7 @@ def search_metric(
     identity: str,
     *,
     checkpoint: Path | None = None,
-) -> tuple[SceneNet, pd.DataFrame]:
+) -> tuple[MetricSceneNet, pd.DataFrame]:
     """Search for the numbers of a new SCENE-Net in metres; as ``scenenet.training.train.fit``.
 
     A row of the history is a generation of the search: loss is 1 - F0.5 on the training crops, as
@@ -42,7 +42,7 @@ def search_metric(
         identity: of all that a checkpoint depends on.
     """
     model = new_model(settings, seed)
-    assert isinstance(model, SceneNet)
+    assert isinstance(model, MetricSceneNet)
     learnt = scenes_of(model, training, settings.measurement)
     kept = scenes_of(model, validation, settings.measurement)
     score = scorer(model, learnt)
@@ -50,7 +50,7 @@ def search_metric(
 
     def row(state: State, seconds: float) -> dict[str, float]:
         model.set_numbers(state.best)
-        return _row(model, state, kept, settings, seconds)
+        return _row(model, state, kept, seconds)
 
     state, history = _resume(checkpoint, identity)
     if state is None:
@@ -77,7 +77,7 @@ def search_metric(
 
 
 def _trial(
-    model: SceneNet, score: Score, settings: SearchSettings, entropy: list[int]
+    model: MetricSceneNet, score: Score, settings: SearchSettings, entropy: list[int]
 ) -> list[State]:
     """The first generations of a search, its beginning included.
 
@@ -93,7 +93,7 @@ def _trial(
 
 
 def _row(
-    model: SceneNet, state: State, kept: Sequence[Scene], settings: ModelSettings, seconds: float
+    model: MetricSceneNet, state: State, kept: Sequence[Scene], seconds: float
 ) -> dict[str, float]:
     loss = 1 - state.best_score
     row = {"epoch": state.generation, "loss": loss, "fidelity": loss, "penalty": 0.0}
@@ -101,7 +101,7 @@ def _row(
     row |= {"validation_loss": float("nan"), "validation_f05": float("nan")}
     if kept:
         curve = curve_of(model, kept)
-        row["validation_loss"] = 1 - best_step(curve, settings.metric.false_weight)[1]
+        row["validation_loss"] = 1 - model.best_step(curve)[1]
         row["validation_f05"] = curve.best()[1].f05
     return row | model.shape_parameters()
 

@@ -13,57 +13,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
-from scenenet.metrics.voxel_scores import BETA
-from scenenet.models.answers import Scene, curve_of
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.metric_scenenet import MetricSceneNet
+from scenenet.models.predictions import Scene, curve_of
 from scenenet.training.cma_es import Score
 
 
-def _coarse_steps() -> np.ndarray:
-    observed = np.arctanh(THRESHOLDS)
-    wanted = np.exp(np.arange(np.log(observed[0]), np.log(observed[-1]), APART))
-    return np.unique(np.searchsorted(observed, wanted * (1 - 1e-9)))
-
-
-APART = 0.05
-"""Share by which the thresholds that are tried differ in the observer's answer."""
-STEPS = _coarse_steps()
-"""Their numbers in ``scenenet.metrics.threshold_curve.THRESHOLDS``, ascending."""
-
-
-def best_step(curve: ThresholdCurve, false_weight: float) -> tuple[int, float]:
-    """The threshold with the highest F0.5 if a false voxel counts ``false_weight`` times.
-
-    Only ``STEPS`` are tried. Between finer ones the choice falls on where a few voxels of the crops
-    at hand happen to lie, and does not carry over to others.
-
-    Returns:
-        its number in ``THRESHOLDS``, the highest in a tie, and that F0.5.
-    """
-    tp = curve.true[::-1].cumsum()[::-1][1:]
-    fp = curve.false[::-1].cumsum()[::-1][1:]
-    b2 = BETA**2
-    found = (1 + b2) * tp
-    below = found + b2 * (int(curve.true.sum()) - tp) + false_weight * fp
-    f05 = (found / np.maximum(below, 1e-12))[STEPS]
-    highest = len(f05) - 1 - int(np.argmax(f05[::-1]))
-    return int(STEPS[highest]), float(f05[highest])
-
-
-def scorer(model: SceneNet, scenes: Sequence[Scene]) -> Score:
-    """The score of a set of numbers: the F0.5 of ``best_step`` at its own best tau."""
-    assert model.metric is not None
-    false_weight = model.metric.false_weight
+def scorer(model: MetricSceneNet, scenes: Sequence[Scene]) -> Score:
+    """Scores a set of numbers by the weighted F0.5 at its own best tau."""
 
     def score(numbers: np.ndarray) -> float:
         model.set_numbers(numbers)
-        return best_step(curve_of(model, scenes), false_weight)[1]
+        return model.best_step(curve_of(model, scenes))[1]
 
     return score
 
 
-def draws(model: SceneNet, n: int, rng: np.random.Generator) -> np.ndarray:
+def draws(model: MetricSceneNet, n: int, rng: np.random.Generator) -> np.ndarray:
     """(n, P) numbers over the whole ranges; the mixing weights evenly over all there can be."""
     n_mixing = len(model.names) - 1
     share = rng.uniform(0.03, 0.97, (n, model.n_parameters() - n_mixing))

@@ -19,10 +19,10 @@ from scenenet.dataset.batches import batch
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings
-from scenenet.models.answers import EVALUATED_AT_ONCE, threshold_curve
 from scenenet.models.base import VoxelModel
+from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import ModelCard, write_model
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.predictions import EVALUATED_AT_ONCE, threshold_curve
 from scenenet.models.settings import ModelSettings, TrainingSettings
 from scenenet.training.initialisation import starting_model
 from scenenet.training.losses import VoxelWeights, fidelity, negativity
@@ -152,7 +152,7 @@ def fit(
                 remedy="Set a lower training.learning_rate",
             )
         row |= _validate(model, validation, settings, weights)
-        if isinstance(model, SceneNet):
+        if isinstance(model, GeneoModel):
             row |= model.shape_parameters()
         history.append({"epoch": epoch} | row)
         if checkpoint is not None:

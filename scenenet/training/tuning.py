@@ -10,14 +10,12 @@ from typing import Any
 from scenenet.core.files import atomic, read_json, write_json
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
-from scenenet.dataset.voxels import VoxelSample
-from scenenet.metrics.threshold_curve import curve_columns
-from scenenet.models.answers import threshold_curve
+from scenenet.dataset.voxels import Measurement, VoxelSample
+from scenenet.metrics.threshold_curve import ThresholdCurve, curve_columns
 from scenenet.models.base import VoxelModel
 from scenenet.models.model_file import ModelCard, read_model, write_model
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import TuningSettings
-from scenenet.training.objective import best_step
 
 
 def tune(
@@ -37,7 +35,7 @@ def tune(
     trained, card = read_model(model)
     samples = load(voxel_manifests, crops_in(split, "validation")).samples
     learnt: Sequence[VoxelSample] = ()
-    if trained.metric is not None:
+    if trained.tau_from_training:
         learnt = load(voxel_manifests, crops_in(split, "train")).samples
     tuned, card, result = choose(trained, card, samples, settings, learnt)
     write_model(out_model, tuned, card)
@@ -60,19 +58,11 @@ def choose(
             choose by. The scores are those of the validation part all the same.
     """
     candidates: list[VoxelModel] = [model]
-    metric = model.metric
-    if isinstance(model, SceneNet) and metric is None:
-        sizes = [size for size in settings.kernel_sizes if size != model.kernel_size]
-        candidates += [model.with_kernel_size(size) for size in sizes]
+    candidates += model.with_kernel_sizes(settings.kernel_sizes)
     tried = []
     for candidate in candidates:
-        curve = threshold_curve(candidate, validation, card.measurement)
-        if metric is None:
-            tau, counts = curve.best()
-        else:
-            both = curve + threshold_curve(candidate, learnt, card.measurement)
-            step, _ = best_step(both, metric.false_weight)
-            tau, counts = float(curve.tau[step]), curve.confusion(step)
+        tau, curve = tuned_tau(candidate, validation, learnt, card.measurement)
+        counts = curve.at(tau)
         tried.append((counts.f05, tau, candidate, curve, counts))
     # The size it was trained with comes first and wins a tie.
     _, tau, tuned, curve, counts = max(tried, key=lambda entry: entry[0])
@@ -87,6 +77,23 @@ def choose(
         ],
     }
     return tuned, card.with_tau(tau), result
+
+
+def tuned_tau(
+    model: VoxelModel,
+    validation: Sequence[VoxelSample],
+    training: Sequence[VoxelSample],
+    measurement: Measurement,
+) -> tuple[float, ThresholdCurve]:
+    """tau, and the scores on ``validation`` at every tau.
+
+    Args:
+        training: crops the model was trained on; used where ``model.tau_from_training``.
+    """
+    curve = threshold_curve(model, validation, measurement)
+    if not model.tau_from_training:
+        return model.best_tau(curve), curve
+    return model.best_tau(curve + threshold_curve(model, training, measurement)), curve
 
 
 def champion(

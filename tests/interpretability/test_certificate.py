@@ -9,8 +9,8 @@ import pytest
 from scenenet.interpretability.certificate import certificate
 from scenenet.interpretability.geneo_properties import certify
 from scenenet.models.cnn import CNN
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard, write_model
-from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings
 
 
@@ -31,7 +31,7 @@ def card() -> ModelCard:
 @pytest.fixture(scope="module")
 def field(card, tmp_path_factory):
     path = tmp_path_factory.mktemp("models") / "m.json"
-    write_model(path, SceneNet(metric=MetricSettings()), card)
+    write_model(path, MetricSceneNet(metric=MetricSettings()), card)
     return certificate(path)
 
 
@@ -40,7 +40,7 @@ def test_it_is_that_of_the_model_at_the_voxel_size_of_its_card(field, card, tmp_
 
     path = tmp_path / "m.json"
     small = card.model_copy(update={"voxel_size": 1.5})
-    write_model(path, SceneNet(metric=MetricSettings()), small)
+    write_model(path, MetricSceneNet(metric=MetricSettings()), small)
     model, _ = read_model(path)
     found = certificate(path)
     assert found["l1"] == certify(model, voxel_size=1.5, tau=0.7).l1

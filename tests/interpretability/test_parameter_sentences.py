@@ -13,6 +13,7 @@ import torch
 from scenenet.geneo import Lattice, kernel_named
 from scenenet.geneo.sentences import Surroundings
 from scenenet.interpretability.parameter_sentences import parameters_of, sentences
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings
 
@@ -43,7 +44,7 @@ def test_kernels_in_voxels_are_brought_to_metres_and_those_in_metres_stay():
     assert in_voxels["arrow.beta"].factor == 1
     assert in_voxels["lambda.arrow"].factor == 1
     assert in_voxels["cylinder.sigma"].unit == "m^2"
-    in_metres = parameters_of(SceneNet(metric=MetricSettings()), 0.5)
+    in_metres = parameters_of(MetricSceneNet(metric=MetricSettings()), 0.5)
     assert {p.factor for p in in_metres} == {1.0}
     assert [p.name for p in in_metres] == list(SceneNet().shape_parameters())
 

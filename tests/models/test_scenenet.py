@@ -200,7 +200,7 @@ def test_another_kernel_size_keeps_the_numbers():
     ("change", "message"),
     [
         (lambda n: n.pop("arrow.beta"), "missing: arrow.beta"),
-        (lambda n: n.update({"arrow.h": 1.0}), "not known: arrow.h"),
+        (lambda n: n.update({"arrow.h": 1.0}), "unknown: arrow.h"),
         (lambda n: n.update({"lambda.arrow": 3.0}), "sum to .*, not to 1"),
     ],
 )

@@ -8,7 +8,8 @@ import torch
 
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.models.factory import new_model
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.settings import MetricSettings, ModelSettings, TrainingSettings
 from scenenet.results.folder import SeedResult
 from scenenet.results.initial_models import DRAWN, FIRST_STEP, start_of
@@ -46,14 +47,14 @@ def test_kernels_are_shown_at_the_size_that_was_chosen_later():
 def test_of_a_search_the_first_row_of_the_history_is_taken():
     settings = ModelSettings(name="m", kind="scenenet", protocol="operational")
     trained = new_model(settings, 3).at(0.5)
-    assert isinstance(trained, SceneNet)
+    assert isinstance(trained, GeneoModel)
     first = trained.shape_parameters() | {"cylinder.r": 0.7}
     rows = [{"epoch": 1, "loss": 0.9, "search": 2, **first}, {"epoch": 2, "loss": 0.8, **first}]
     rows[1]["cylinder.r"] = 0.2
     start = start_of(result(settings, pd.DataFrame(rows)), trained)
     assert start is not None
     assert start.said == FIRST_STEP
-    assert isinstance(start.model, SceneNet)
+    assert isinstance(start.model, GeneoModel)
     assert start.model.shape_parameters()["cylinder.r"] == pytest.approx(0.7)
     assert start.model.kernel_size == trained.kernel_size
 
@@ -67,5 +68,5 @@ def test_a_start_that_looked_at_the_data_is_not_drawn_again():
 
 
 def test_without_a_record_and_a_history_nothing_is_said():
-    model = SceneNet(metric=MetricSettings())
+    model = MetricSceneNet(metric=MetricSettings())
     assert start_of(SeedResult("m", "scenenet", 3, {}), model) is None

@@ -10,8 +10,8 @@ from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.geneo import kernel_named
-from scenenet.models.answers import threshold_curve
 from scenenet.models.factory import new_model
+from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import ModelSettings, TrainingSettings
 from scenenet.training.initialisation import discriminant, informed_model, starting_model
 from scenenet.training.train import fit

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from scenenet.core.errors import InputError
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.geneo import kernel_named
-from scenenet.models.answers import probabilities, threshold_curve
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard, read_model, write_model
+from scenenet.models.predictions import probabilities, threshold_curve
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings, ModelSettings, SearchSettings, TuningSettings
 from scenenet.training import metric_search
@@ -33,7 +34,7 @@ def settings(generations: int = 6, **changes) -> ModelSettings:
 
 
 def net(seed: int = 0, lengths: MetricSettings = SMALL) -> SceneNet:
-    return SceneNet(metric=lengths, generator=torch.Generator().manual_seed(seed))
+    return MetricSceneNet(metric=lengths, generator=torch.Generator().manual_seed(seed))
 
 
 @pytest.fixture(scope="module")

@@ -8,17 +8,19 @@ import torch
 
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.geneo import kernel_named
+from scenenet.metrics.threshold_choice import STEPS, best_step
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.metrics.voxel_scores import confusion
-from scenenet.models.answers import answers, curve_of, probabilities, scenes_of
+from scenenet.models.metric_scenenet import MetricSceneNet
+from scenenet.models.predictions import answers, curve_of, probabilities, scenes_of
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings
 from scenenet.training.cma_es import NEAR_BEST, advance, begin, settled
-from scenenet.training.objective import STEPS, best_step, draws
+from scenenet.training.objective import draws
 
 
 def model(seed: int = 0) -> SceneNet:
-    return SceneNet(metric=MetricSettings(), generator=torch.Generator().manual_seed(seed))
+    return MetricSceneNet(metric=MetricSettings(), generator=torch.Generator().manual_seed(seed))
 
 
 def bowl(x: np.ndarray) -> float:

@@ -10,8 +10,8 @@ import torch
 from scenenet.core.errors import InputError
 from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import VoxelGrid, VoxelSettings, voxelise
-from scenenet.models.answers import probabilities, threshold_curve
 from scenenet.models.model_file import read_model
+from scenenet.models.predictions import probabilities, threshold_curve
 from scenenet.models.settings import LossSettings, ModelSettings, TrainingSettings
 from scenenet.training import train as training
 from scenenet.training.losses import VoxelWeights, fidelity

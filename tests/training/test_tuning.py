@@ -10,9 +10,9 @@ from scenenet.core.files import read_json
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.metrics.threshold_curve import THRESHOLDS
 from scenenet.metrics.voxel_scores import confusion
-from scenenet.models.answers import probabilities
 from scenenet.models.cnn import CNN
 from scenenet.models.model_file import read_model, write_model
+from scenenet.models.predictions import probabilities
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import TuningSettings
 from scenenet.training.tuning import champion, choose, tune

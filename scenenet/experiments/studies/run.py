@@ -21,10 +21,10 @@ from scenenet.dataset.voxels import VoxelSample, VoxelSettings, voxelise
 from scenenet.experiments.studies.settings import Plan, StudySettings
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.metrics.voxel_scores import Confusion
-from scenenet.models.answers import threshold_curve
 from scenenet.models.base import VoxelModel
 from scenenet.models.factory import new_model
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import ModelSettings
 from scenenet.training.train import LostTraining, fit
 
@@ -143,7 +143,7 @@ def _trained(
 
 def _lowest(model: VoxelModel) -> dict[str, float]:
     """Below zero they break the convexity that the loss is to keep (thesis 4.5, 5.3.3)."""
-    if not isinstance(model, SceneNet):
+    if not isinstance(model, GeneoModel):
         return dict.fromkeys(LOWEST, math.nan)
     numbers = model.shape_parameters()
     mixing = [value for name, value in numbers.items() if name.startswith("lambda.")]
@@ -154,11 +154,10 @@ def _lowest(model: VoxelModel) -> dict[str, float]:
 def _applied(model: VoxelModel, plan: Plan) -> VoxelModel:
     if plan.applied_size is None:
         return model
-    if not isinstance(model, SceneNet):
-        raise InputError(
-            f"{plan.name}: a {model.kind} has no other kernel size than the one it was trained with"
-        )
-    return model.with_kernel_size(plan.applied_size)
+    try:
+        return model.with_kernel_size(plan.applied_size)
+    except InputError as error:
+        raise InputError(f"{plan.name}: {error.problem}", remedy=error.remedy) from None
 
 
 def _nothing_found(scored: Sequence[VoxelSample]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import Measurement, VoxelSample
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.models.base import VoxelModel
-from scenenet.models.scenenet import SceneNet
+from scenenet.models.metric_scenenet import MetricSceneNet
 
 EVALUATED_AT_ONCE = 8
 """Crops that are scored together: enough to keep the cores busy, few enough to need no memory."""
@@ -27,7 +27,7 @@ def threshold_curve(
     model: VoxelModel, samples: Sequence[VoxelSample], measurement: Measurement
 ) -> ThresholdCurve:
     """Scores at every tau over all voxels of ``samples``, empty ones included."""
-    if isinstance(model, SceneNet) and model.metric is not None:
+    if isinstance(model, MetricSceneNet):
         return curve_of(model, scenes_of(model, samples, measurement))
     total = ThresholdCurve.empty()
     with torch.no_grad():
@@ -42,7 +42,7 @@ def probabilities(
     model: VoxelModel, sample: VoxelSample, measurement: Measurement
 ) -> tuple[np.ndarray, np.ndarray]:
     """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid."""
-    if isinstance(model, SceneNet) and model.metric is not None:
+    if isinstance(model, MetricSceneNet):
         (scene,) = scenes_of(model, [sample], measurement)
         with torch.no_grad():
             return sample.spread(answers(model, scene))
@@ -76,7 +76,7 @@ class Scene:
 
 
 def scenes_of(
-    model: SceneNet, samples: Sequence[VoxelSample], measurement: Measurement
+    model: MetricSceneNet, samples: Sequence[VoxelSample], measurement: Measurement
 ) -> list[Scene]:
     """The crops of ``samples`` as ``model`` takes them."""
     scenes = []
@@ -90,7 +90,7 @@ def scenes_of(
     return scenes
 
 
-def answers(model: SceneNet, scene: Scene) -> np.ndarray:
+def answers(model: MetricSceneNet, scene: Scene) -> np.ndarray:
     """Probability of each occupied voxel, (M,) float32; that of the others is 0."""
     kernel, _ = model.at(scene.voxel_size).observer()
     observed = convolve_at_voxels(scene.observed, kernel.detach()[None])[0].numpy()
@@ -98,7 +98,7 @@ def answers(model: SceneNet, scene: Scene) -> np.ndarray:
     return np.tanh(np.maximum(spoken, 0))[scene.row]
 
 
-def curve_of(model: SceneNet, scenes: Sequence[Scene]) -> ThresholdCurve:
+def curve_of(model: MetricSceneNet, scenes: Sequence[Scene]) -> ThresholdCurve:
     """Scores at every tau over all voxels, empty ones included."""
     total = ThresholdCurve.empty()
     with torch.no_grad():

@@ -1,0 +1,201 @@
+"""SCENE-Net with kernels in metres (docs/method/operational_protocol.md)."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Self
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from scenenet.convolution.coarsening import block_edge
+from scenenet.convolution.convolve import convolve_at_voxels
+from scenenet.convolution.cross_section import neighbours, section_offsets, strongest, whole_voxels
+from scenenet.convolution.occupancy import Occupancy
+from scenenet.core.errors import InputError
+from scenenet.geneo import Lattice, ShapeParameter, kernel_named
+from scenenet.metrics.threshold_choice import best_step
+from scenenet.metrics.threshold_curve import ThresholdCurve
+from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.settings import THESIS_GENEOS, KernelSize, MetricSettings
+
+COLUMN_M = 2.0
+"""Occupied metres of a tower's axis at which the observer H is 1. It only sets the scale of H: the
+twelve metres that the kernels reach then give at most 6, where float32 still resolves
+probabilities."""
+TINY = 1e-9
+"""Smaller mixing weights are read as this one."""
+LOGIT_END = 16.0
+"""Largest |logit|: float32 cannot distinguish a sigmoid beyond it from its bound."""
+
+
+class MetricSceneNet(GeneoModel):
+    """A SCENE-Net whose kernels have lengths in metres.
+
+    - Kernels are sampled at the voxel size of the grid (``at``), and H is weighted by it: a tower
+      column that is occupied over a given height has the same H on every grid.
+    - Parameters are stored as logits between their bounds and mixing weights as softmax logits, so
+      every parameter is positive and every mixture convex.
+    - An empty voxel has probability 0. An occupied voxel takes the strongest response in its
+      cross-section (``scenenet.convolution.cross_section``).
+
+    Attributes:
+        metric: the lengths, m.
+        voxel_size: m, edge of the voxels that the kernels are sampled at.
+    """
+
+    units = "m"
+    tau_from_training = True
+    voxel_size: float
+
+    def __init__(
+        self,
+        geneos: Sequence[str] = THESIS_GENEOS,
+        metric: MetricSettings | None = None,
+        *,
+        generator: torch.Generator | None = None,
+    ) -> None:
+        """Draw the parameters at random over their ranges; the voxel size is 1 m at first.
+
+        Args:
+            geneos: kernel names; a name may be repeated.
+            metric: lengths; the defaults if None.
+            generator: source of the random numbers; torch's default if None.
+
+        Raises:
+            InputError: a kernel is unknown, or there is none.
+        """
+        super().__init__(geneos, generator)
+        self.metric = metric or MetricSettings()
+        self._discretise(1.0)
+
+    def _initial_shape(self, parameter: ShapeParameter, drawn: Tensor) -> Tensor:
+        return torch.logit(0.03 + 0.94 * drawn)
+
+    def _initial_mixing(self, drawn: Tensor) -> Tensor:
+        return 6 * drawn - 3
+
+    def at(self, voxel_size: float) -> Self:
+        if voxel_size == self.voxel_size:
+            return self
+        other = copy.copy(self)  # shallow: both models share the trained numbers
+        other._discretise(voxel_size)
+        return other
+
+    def _discretise(self, voxel_size: float) -> None:
+        up, down = (whole_voxels(m, voxel_size) for m in (self.metric.above, self.metric.below))
+        wide = 2 * whole_voxels(self.metric.radius, voxel_size) + 1
+        # Centred on the voxel it responds at, so twice the longer side high; ``kernels`` sets the
+        # excess of the shorter side to zero.
+        self.kernel_size = (2 * max(up, down) + 1, wide, wide)
+        self.voxel_size = float(voxel_size)
+
+    def observed_size(self, voxel_size: float) -> float:
+        return voxel_size * block_edge(voxel_size)
+
+    @property
+    def whole_towers(self) -> bool:
+        return self.metric.whole_towers
+
+    def best_tau(self, curve: ThresholdCurve) -> float:
+        """tau with the highest F0.5 when a false voxel counts ``metric.false_weight`` times."""
+        return float(curve.tau[self.best_step(curve)[0]])
+
+    def best_step(self, curve: ThresholdCurve) -> tuple[int, float]:
+        """Number of ``best_tau`` in the thresholds, and the weighted F0.5 there."""
+        return best_step(curve, self.metric.false_weight)
+
+    @property
+    def reach(self) -> tuple[int, int, int]:
+        z, y, x = super().reach
+        wide = whole_voxels(self.metric.section_radius, self.voxel_size)
+        high = whole_voxels(self.metric.section_above, self.voxel_size)
+        return z + high, y + wide, x + wide
+
+    def section(self, occupancy: Occupancy) -> tuple[np.ndarray, np.ndarray]:
+        """The occupied voxels in the cross-section of each one
+        (``scenenet.convolution.cross_section.neighbours``)."""
+        lengths = self.metric.section_radius, self.metric.section_above
+        return neighbours(occupancy, section_offsets(*lengths, self.voxel_size))
+
+    def argmax_rows(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
+        return strongest(observed.detach().numpy(), *self.section(occupancy))
+
+    def forward(self, occupancy: Occupancy) -> Tensor:
+        """Probability that each voxel is part of a tower, (B, D, H, W) in [0, 1].
+
+        It is 0 in empty voxels, and there is no gradient.
+        """
+        kernel, _ = self.observer()
+        observed = convolve_at_voxels(occupancy, kernel.detach()[None])[0]
+        strongest_observed = observed[torch.from_numpy(self.argmax_rows(occupancy, observed))]
+        volume = torch.zeros(occupancy.n_voxels, dtype=observed.dtype)
+        volume[torch.from_numpy(occupancy.flat())] = torch.relu(torch.tanh(strongest_observed))
+        return volume.reshape(len(occupancy), *occupancy.shape)
+
+    def shape_of(self, name: str) -> dict[str, Tensor]:
+        stored = self._stored_shape(name)
+        ranges = {p.name: p.metric_range for p in self.parameters_of(name)}
+        return {
+            symbol: low * (high / low) ** torch.sigmoid(stored[symbol])
+            for symbol, (low, high) in ranges.items()
+        }
+
+    def mixing_weights(self) -> Tensor:
+        """lambda, (K,), positive, sums to 1: a softmax whose last logit is 0."""
+        free = [self.mixing[name] for name in self.names[:-1]]
+        return torch.softmax(torch.stack([*free, torch.zeros(())]), dim=0)
+
+    def kernels(self) -> Tensor:
+        lattice = Lattice.of_extent(self.kernel_size, self.metric.radius, self.voxel_size)
+        sampled = torch.stack(
+            [
+                kernel_named(geneo).sample(lattice, self.shape_of(name))
+                for name, geneo in zip(self.names, self.geneos, strict=True)
+            ]
+        )
+        ends = (lattice.z >= -self.metric.below * (1 + 1e-6)) & (
+            lattice.z <= self.metric.above * (1 + 1e-6)
+        )
+        assert lattice.inside is not None
+        return sampled * lattice.inside * ends * (self.voxel_size / COLUMN_M)
+
+    def unit_of(self, parameter: ShapeParameter) -> str:
+        return parameter.metric_unit
+
+    def length_unit_m(self, voxel_size: float) -> float:
+        return 1.0
+
+    def _assign(self, numbers: Mapping[str, float]) -> None:
+        for name in self.names:
+            stored = self._stored_shape(name)
+            for parameter in self.parameters_of(name):
+                low, high = parameter.metric_range
+                value = numbers[f"{name}.{parameter.name}"]
+                if not low * (1 - 1e-4) <= value <= high * (1 + 1e-4):
+                    raise InputError(
+                        f"{name}.{parameter.name} = {value:g} {parameter.metric_unit} does not lie "
+                        f"within {low:g} to {high:g}"
+                    )
+                share = math.log(value / low) / math.log(high / low)
+                stored[parameter.name].data.fill_(_logit(share))
+        weights = [numbers[f"lambda.{name}"] for name in self.names]
+        if min(weights) < 0:
+            raise InputError("a mixing weight is negative")
+        for name, weight in zip(self.names[:-1], weights, strict=False):
+            self.mixing[name].data.fill_(math.log(max(weight, TINY) / max(weights[-1], TINY)))
+
+    def with_kernel_size(self, kernel_size: KernelSize) -> Self:
+        raise InputError(
+            "the kernels of this SCENE-Net are in metres; their voxels follow from the grid",
+            remedy="Use a model of protocol thesis for other kernel sizes",
+        )
+
+
+def _logit(share: float) -> float:
+    if share <= 0 or share >= 1:
+        return LOGIT_END if share >= 1 else -LOGIT_END
+    return max(-LOGIT_END, min(LOGIT_END, math.log(share / (1 - share))))

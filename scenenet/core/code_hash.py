@@ -192,8 +192,8 @@ def _imports(tree: ast.AST, inside: str) -> Iterator[tuple[str, str, str | None]
 
 
 def _executed(node: ast.AST) -> Iterator[ast.AST]:
-    """All nodes below ``node`` but the bodies of ``if TYPE_CHECKING``."""
-    for child in ast.iter_child_nodes(node):
+    """All statements below ``node`` but the bodies of ``if TYPE_CHECKING``."""
+    for child in _statements(node):
         if isinstance(child, ast.If) and ast.unparse(child.test) in _TYPE_CHECKING:
             for statement in child.orelse:
                 yield statement
@@ -201,6 +201,15 @@ def _executed(node: ast.AST) -> Iterator[ast.AST]:
             continue
         yield child
         yield from _executed(child)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """The statements, handlers and cases right below ``node``. Expressions hold none, and looking into
+    them would take most of the time."""
+    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
+        children = getattr(node, part, None)
+        if isinstance(children, list):
+            yield from children
 
 
 def _is_import(statement: ast.stmt) -> bool:
@@ -215,7 +224,9 @@ def _is_import(statement: ast.stmt) -> bool:
 def _strip_docstrings(tree: ast.Module) -> None:
     """Take out texts that stand alone as a statement: docstrings of modules, classes, functions
     and attributes."""
-    for node in ast.walk(tree):
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
         for part in ("body", "orelse", "finalbody"):
             statements = getattr(node, part, None)
             if isinstance(statements, list):
@@ -223,6 +234,7 @@ def _strip_docstrings(tree: ast.Module) -> None:
                 # The body of a function must hold something; other parts need not.
                 empty = [ast.Pass()] if statements and part == "body" else []
                 setattr(node, part, kept or empty)
+        waiting += _statements(node)
 
 
 def _is_text(statement: ast.stmt) -> bool:

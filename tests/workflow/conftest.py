@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +16,8 @@ from typing import Any
 import pytest
 import yaml
 
-PARTS = ("Snakefile", "profiles", "workflow", "config", "scenenet")
+PARTS = ("Snakefile", "profiles", "workflow", "config")
+PACKAGE = "scenenet"
 RUN_LIMIT_S = 900
 
 
@@ -24,10 +27,12 @@ class Project:
 
     Attributes:
         folder: its root.
+        package: the folder that holds the package that snakemake and its jobs import.
         shown: what the first run wrote to the terminal.
     """
 
     folder: Path
+    package: Path
     shown: str = ""
 
     @property
@@ -35,11 +40,11 @@ class Project:
         return self.folder / "results"
 
     def snakemake(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Call snakemake here; it and its jobs import the package of this folder."""
+        """Call snakemake here."""
         return subprocess.run(
             [sys.executable, "-m", "snakemake", *arguments],
             cwd=self.folder,
-            env={**os.environ, "PYTHONPATH": str(self.folder)},
+            env={**os.environ, "PYTHONPATH": str(self.package)},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
@@ -63,7 +68,7 @@ class Project:
         return {rule: int(count) for rule, count in counts if rule != "all"}
 
     def refused(self, *arguments: str) -> str:
-        """What is said where no job may start."""
+        """The message where no job may start."""
         done = self.snakemake("-n", *arguments)
         assert done.returncode != 0
         assert "Job stats" not in done.stdout
@@ -86,10 +91,10 @@ class Project:
         return yaml.safe_load((self.folder / "config" / "config.yaml").read_text())[name]
 
     def edit(self, path: str, old: str, new: str) -> None:
-        """Replace text that a file has once."""
+        """Replace a text that occurs once in a file."""
         file = self.folder / path
         text = file.read_text()
-        assert text.count(old) == 1, f"{old!r} is {text.count(old)} times in {path}"
+        assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times in {path}"
         file.write_text(text.replace(old, new))
 
     def add_row(self, *cells: str) -> None:
@@ -98,46 +103,89 @@ class Project:
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory, project_root) -> Project:
+def project_in(project_root: Path) -> Callable[[Path], Project]:
+    """A function that gives the project in a folder, with the package of the repository."""
+    return lambda folder: Project(folder, package=project_root)
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A survey that the workflow did not make."""
+    from scenenet.synthetic import SyntheticSettings, make_survey
+
+    path = tmp_path_factory.mktemp("recorded") / "own.laz"
+    make_survey(SyntheticSettings(towers=2, seed=9, density=4), path)
+    return path
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory, project_root, recorded) -> Project:
     """The workflow after its first run: two synthetic surveys to train on and a recorded one that
-    is only classified. Not to be changed; take ``project`` for that."""
-    folder = tmp_path_factory.mktemp("finished") / "project"
-    folder.mkdir()
-    for name in PARTS:
-        source = project_root / name
+    is only classified. Not to be changed; take ``project`` for that.
+
+    All workers of a test run share it: the first one runs it, the others wait.
+    """
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+    folder, shown = shared / "finished" / "project", shared / "finished" / "shown.txt"
+    with (shared / "finished.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not shown.exists():
+            # It uses the package of the repository, which may be compiled already. The tests change
+            # a copy. Nothing runs again because of the copy: digests are those of the content.
+            first = Project(folder, package=project_root)
+            _copy(project_root, folder, PARTS)
+            _configure(first, recorded)
+            text = first.run()
+            _copy(project_root, folder, [PACKAGE])
+            shown.write_text(text, encoding="utf-8")
+    return Project(folder, package=folder, shown=shown.read_text(encoding="utf-8"))
+
+
+def _copy(root: Path, folder: Path, names: Iterable[str]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        source = root / name
         if source.is_dir() and not source.is_symlink():
             ignored = shutil.ignore_patterns("__pycache__")
             shutil.copytree(source, folder / name, ignore=ignored)
         else:
             shutil.copy2(source, folder / name, follow_symlinks=False)
-    project = Project(folder)
-    project.configure(_tiny(yaml.safe_load((project_root / "config" / "test.yaml").read_text())))
-    sheet = folder / "config" / "surveys.tsv"
+
+
+def _configure(project: Project, recorded: Path) -> None:
+    test = project.folder / "config" / "test.yaml"
+    project.configure(_tiny(yaml.safe_load(test.read_text())))
+    sheet = project.folder / "config" / "surveys.tsv"
     sheet.write_text("survey\tpath\tcodes\trole\n")
     for name in ("first", "second"):
         project.add_row(name, f"{{results_dir}}/synthetic/{name}.laz", "edp", "train")
     project.add_row("own", "data/own.laz", "edp", "new")
-    _record(folder / "data" / "own.laz")
-    return Project(folder, project.run())
+    (project.folder / "data").mkdir()
+    shutil.copyfile(recorded, project.folder / "data" / "own.laz")
 
 
 def _tiny(test: dict[str, Any]) -> dict[str, Any]:
-    """The configuration of minutes, without its new survey and with an inbox."""
+    """The small configuration, without its new survey and with an inbox."""
     test["synthetic"]["surveys"] = test["synthetic"]["surveys"][:2]
     own = {"results_dir": "results", "surveys": "config/surveys.tsv", "dataset": "tiny"}
     return {**test, **own, "new_surveys": {"folder": "surveys", "codes": "edp"}}
 
 
-def _record(path: Path) -> None:
-    """A survey that the workflow did not make."""
-    from scenenet.synthetic import SyntheticSettings, make_survey
+@pytest.fixture(scope="session")
+def copied(finished, tmp_path_factory) -> Callable[[], Project]:
+    """A function that copies the finished project, dates included."""
 
-    make_survey(SyntheticSettings(towers=2, seed=9, density=4), path)
+    def copy() -> Project:
+        folder = tmp_path_factory.mktemp("copied") / "project"
+        subprocess.run(["cp", "-a", str(finished.folder), str(folder)], check=True)
+        return Project(folder, package=folder)
+
+    return copy
 
 
 @pytest.fixture
-def project(finished, tmp_path) -> Project:
-    """A copy of the finished project, dates included, to change and plan again."""
-    folder = tmp_path / "project"
-    subprocess.run(["cp", "-a", str(finished.folder), str(folder)], check=True)
-    return Project(folder)
+def project(copied) -> Project:
+    """A copy of the finished project to change and plan again."""
+    return copied()

@@ -12,32 +12,32 @@ pytestmark = pytest.mark.workflow
 PREDICTED = {"predict": 1, "prediction_map": 1, "report": 1}
 """What follows from another best model: there is one survey to classify."""
 
+SHOWN = {"figures": 1, "track": 1, "register": 1, "interactive_crop": 3}
+"""What shows the scores of models, besides tables and report."""
+
 SCORED = {
-    "tune": 2,
+    "tune_scenenet": 2,
     "tune_cnn": 2,
-    "champion": 1,
+    "champion_scenenet": 1,
     "champion_cnn": 1,
     "certificate": 2,
-    "timing": 2,
+    "inference_time": 2,
     "evaluate": 4,
     "tables": 1,
-    "figures": 1,
-    "track": 1,
-    "register": 1,
-    "scene": 3,
+    **SHOWN,
     **PREDICTED,
 }
 """What follows from trained models: two of each kind."""
 
-TRAINED = {"train": 2, "train_cnn": 2, **SCORED}
+TRAINED = {"train_scenenet": 2, "train_cnn": 2, **SCORED}
 STUDIED = {"study": 2, "study_figure": 2, "track_studies": 1}
 """There are two studies, of one model."""
-NOISE = {"noise": 2, "noise_runs": 1, "contest_figure": 1, "track_contest": 1}
-"""Trainings on wrong labels from two seeds, on lines of their own."""
-BOOSTED_TREES = {"black_box": 1}
-LEARNED = {**TRAINED, **STUDIED, **BOOSTED_TREES}
+NOISE = {"label_noise": 2, "join_runs": 1, "experiment_figure": 1, "track_experiment": 1}
+"""Label noise with two seeds, each with a survey of its own."""
+BASELINE = {"boosted_trees": 1}
+LEARNED = {**TRAINED, **STUDIED, **BASELINE}
 """What follows from other voxels."""
-FROM_CROPS = {**LEARNED, "grid_times": 1}
+FROM_CROPS = {**LEARNED, "voxelisation_time": 1}
 """What follows from other crops."""
 SETTINGS = {"resolved_config": 1}
 """The settings are written down whenever there are others."""
@@ -127,8 +127,8 @@ def test_writing_a_default_down_changes_nothing(project):
 
 def test_a_setting_of_one_stage_runs_that_stage_and_what_follows(project):
     project.configure({"detection.eps": 7.0})
-    after = {"evaluate": 4, "tables": 1, "figures": 1, "track": 1, "register": 1, "scene": 3}
-    assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BOOSTED_TREES}
+    after = {"evaluate": 4, "tables": 1, **SHOWN}
+    assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BASELINE}
 
 
 def test_another_resolution_keeps_the_grids_there_are(project):
@@ -139,28 +139,28 @@ def test_another_resolution_keeps_the_grids_there_are(project):
 
 def test_predicting_with_another_model_trains_nothing(project):
     project.configure({"predict.model": "cnn"})
-    shown = {"figures": 1, "track": 1, "register": 1, "scene": 3}
-    assert project.planned() == {**SETTINGS, **PREDICTED, **shown}
+    assert project.planned() == {**SETTINGS, **PREDICTED, **SHOWN}
 
 
 def test_one_more_seed_trains_only_that_seed(project):
     project.configure({"seeds": [0, 1, 2]})
-    own = {"train": 1, "train_cnn": 1, "tune": 1, "tune_cnn": 1, "evaluate": 2}
-    assert project.planned() == {**SETTINGS, **TRAINED, **BOOSTED_TREES, **own}
+    own = {"train_scenenet": 1, "train_cnn": 1, "tune_scenenet": 1, "tune_cnn": 1, "evaluate": 2}
+    assert project.planned() == {**SETTINGS, **TRAINED, **BASELINE, **own}
 
 
 def test_one_seed_less_trains_nothing(project):
     project.configure({"seeds": [0]})
-    picked = {"champion": 1, "champion_cnn": 1, "certificate": 2, "timing": 2}
-    gathered = {**picked, "tables": 1, "figures": 1, "track": 1, "register": 1, "scene": 3}
-    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BOOSTED_TREES}
+    picked = {"champion_scenenet": 1, "champion_cnn": 1, "certificate": 2, "inference_time": 2}
+    gathered = {**picked, "tables": 1, **SHOWN}
+    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BASELINE}
 
 
 def test_one_more_model_leaves_the_others_alone(project):
     kernel = {"name": "tall", "kind": "scenenet", "kernel_size": [15, 5, 5]}
     models = [{"name": n, "kind": n} for n in ("scenenet", "cnn")]
     project.configure({"models": [*models, kernel]})
-    own = {"train": 2, "tune": 2, "evaluate": 2, "champion": 1, "certificate": 1, "timing": 1}
+    own = {"train_scenenet": 2, "tune_scenenet": 2, "evaluate": 2, "champion_scenenet": 1}
+    own |= {"certificate": 1, "inference_time": 1}
     gathered = {"tables": 1, "figures": 1, "track": 1, "register": 1, "report": 1}
     assert project.planned() == {**SETTINGS, **own, **gathered}
 
@@ -171,23 +171,29 @@ def test_another_study_runs_itself_and_what_shows_it(project):
     project.configure({"studies": told})
     own = {"study": 1, "study_figure": 1, "track_studies": 1}
     shown = {"tables": 1, "report": 1, "mlflow_store": 1, "track": 1, "register": 1}
-    assert project.planned() == {**SETTINGS, **own, **shown, "track_contest": 1}
+    assert project.planned() == {**SETTINGS, **own, **shown, "track_experiment": 1}
 
 
 def test_another_share_of_wrong_labels_trains_on_these_alone(project):
-    project.configure({"noise.levels": [0, 0.3]})
+    project.configure({"label_noise.levels": [0, 0.3]})
     assert project.planned() == {**SETTINGS, **NOISE, "tables": 1, "report": 1}
 
 
 def test_one_more_seed_of_wrong_labels_trains_only_that_seed(project):
-    project.configure({"noise.seeds": [0, 1, 2]})
-    assert project.planned() == {**SETTINGS, **NOISE, "noise": 1, "tables": 1, "report": 1}
+    project.configure({"label_noise.seeds": [0, 1, 2]})
+    assert project.planned() == {**SETTINGS, **NOISE, "label_noise": 1, "tables": 1, "report": 1}
 
 
 def test_cross_validation_is_one_job_a_model_and_reads_the_grids_there_are(project):
     project.configure({"cross_validation": {"leave_out": 2}})
-    own = {"cross_validate": 3, "cross_validation_runs": 1, "contest_figure": 1}
-    logged = {"mlflow_store": 1, "track": 1, "track_studies": 1, "track_contest": 2, "register": 1}
+    own = {"cross_validation": 3, "join_runs": 1, "experiment_figure": 1}
+    logged = {
+        "mlflow_store": 1,
+        "track": 1,
+        "track_studies": 1,
+        "track_experiment": 2,
+        "register": 1,
+    }
     assert project.planned() == {**SETTINGS, **own, **logged, "tables": 1, "report": 1}
 
 
@@ -198,7 +204,8 @@ def test_touching_every_script_and_module_runs_nothing(project):
     for folder in ("workflow", "scenenet"):
         for file in (project.folder / folder).rglob("*.py"):
             file.touch()
-    (project.folder / "Snakefile").touch()
+    for file in ("Snakefile", "workflow/Snakefile"):
+        (project.folder / file).touch()
     assert project.planned() == {}
 
 
@@ -259,7 +266,7 @@ def test_a_deleted_store_or_manifest_is_made_again(project, file):
 
 def test_a_deleted_cache_of_voxels_is_made_again(project):
     (project.results / "voxels/second/cube-32/voxels.zarr.zip").unlink()
-    assert project.planned() == {"voxels": 1, **TRAINED, **BOOSTED_TREES}
+    assert project.planned() == {"voxels": 1, **TRAINED, **BASELINE}
 
 
 @pytest.mark.parametrize(

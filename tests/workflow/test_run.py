@@ -18,10 +18,10 @@ pytestmark = pytest.mark.workflow
 STAGES = {
     *("synthesize", "check", "towers", "crops", "voxels", "split"),
     *("train", "tune", "champion", "evaluate", "predict"),
-    *("certificate", "timing", "grid_times"),
-    *("study", "black_box", "tables", "figures", "scene"),
-    *("noise", "contest_runs"),
-    *("track", "track_studies", "track_contest", "register", "report"),
+    *("certificate", "inference_time", "voxelisation_time"),
+    *("study", "boosted_trees", "tables", "figures", "interactive_crop"),
+    *("label_noise", "join_runs"),
+    *("track", "track_studies", "track_experiment", "register", "report"),
 }
 
 
@@ -36,12 +36,12 @@ def test_a_run_ends_with_every_result(finished):
         "results/predict/own/own.towers.geojson",
         "results/mlflow/runs.json",
         "results/mlflow/registry.json",
-        "results/studies/ablations/runs.csv",
+        "results/study/ablations/runs.csv",
         "results/tables/study-ablations.csv",
         "results/tables/thesis_and_ours.csv",
         "results/figures/study-ablations.png",
-        "results/black_box/seed-1.json",
-        "results/scenes/median.json",
+        "results/boosted_trees/seed-1.json",
+        "results/interactive_crop/median.json",
         "results/report/index.html",
         "mlflow.db",
     ):
@@ -97,14 +97,14 @@ def test_the_model_file_names_code_settings_and_data(finished):
 
 def test_every_training_is_a_run_in_mlflow(finished):
     runs = read_json(finished.results / "mlflow/runs.json")["runs"]
-    assert len(runs) == 3 * (1 + 2)  # a group and two seeds for each model and the black box
+    assert len(runs) == 3 * (1 + 2)  # a group and two seeds for each model and the boosted trees
     studied = {}
     for study, variants in (("ablations", 2), ("starts", 3)):
         logged = read_json(finished.results / f"mlflow/study-{study}.json")["runs"]
         assert len(logged) == variants * (1 + 1)  # from one seed
         studied |= logged
-    noisy = read_json(finished.results / "mlflow/noise.json")["runs"]
-    assert len(noisy) == 2 * 4 * (1 + 2)  # levels; two models, the black box, the labels; seeds
+    noisy = read_json(finished.results / "mlflow/label_noise.json")["runs"]
+    assert len(noisy) == 2 * 4 * (1 + 2)  # levels; two models, the boosted trees, the labels; seeds
     with sqlite3.connect(finished.folder / "mlflow.db") as store:
         (active,) = store.execute(
             "SELECT count(*) FROM runs WHERE lifecycle_stage = 'active'"

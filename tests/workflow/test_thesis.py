@@ -41,7 +41,7 @@ FIGURES = {
     "Figures 5.8, 5.9, worst": "crop-worst",
     "Figure 5.10": "resolutions",
     "Table 5.5": "study-ablations",
-    "5.2.5": "noise",
+    "5.2.5": "label_noise",
     "5.2.6, starts": "study-starts",
 }
 STUDIES = {
@@ -81,17 +81,17 @@ def test_a_figure_is_there_with_a_caption_and_words_for_it(finished, place):
     assert len(said["alt"]) > 40
 
 
-def test_5_2_5_is_a_study_of_wrong_labels_with_the_truth_beside(finished):
-    table = pd.read_csv(finished.results / "tables" / "noise.csv")
-    assert set(table["model"]) == {"the labels", "scenenet", "cnn", "black box"}
+def test_5_2_5_is_an_experiment_with_label_noise_scored_against_the_truth_as_well(finished):
+    table = pd.read_csv(finished.results / "tables" / "label_noise.csv")
+    assert set(table["model"]) == {"the labels", "scenenet", "cnn", "boosted trees"}
     assert list(table["level"].unique()) == [0.0, 0.4]
     assert (table["share"] - table["level"]).abs().max() < 0.05
     labels = table[table["model"] == "the labels"].set_index("level")
     assert labels.loc[0.0, "truth_f05"] == 1 > labels.loc[0.4, "truth_f05"]
-    runs = pd.read_csv(finished.results / "noise" / "runs.csv")
+    runs = pd.read_csv(finished.results / "label_noise" / "runs.csv")
     assert len(runs) == 2 * 2 * 4  # levels, seeds, models and the labels
-    logged = read_json(finished.results / "mlflow" / "noise.json")
-    assert logged["experiment"].endswith("-noise")
+    logged = read_json(finished.results / "mlflow" / "label_noise.json")
+    assert logged["experiment"].endswith("-label_noise")
     page = (finished.results / "report" / "index.html").read_text()
     assert "Trained on wrong labels" in page
 
@@ -131,7 +131,7 @@ def test_times_are_measured_and_memory_is_that_of_a_process_with_torch(finished)
         assert 0 < row["inference_ms"] < row["inference_ms_128"]
         assert row["training_seconds"] > 0
     assert (table["peak_memory_mb"] > 100).all()
-    assert "black box" in table.index
+    assert "boosted trees" in table.index
 
 
 def test_what_is_certain_of_a_scenenet_is_said_and_the_opening_names_who_predicts(finished):
@@ -146,14 +146,14 @@ def test_what_is_certain_of_a_scenenet_is_said_and_the_opening_names_who_predict
         "scenenet (seed",
         "is the model that predicts",
         "cnn (seed",
-        "black box (all seeds)",
+        "boosted trees (all seeds)",
     ):
         assert said in opening
 
 
 @pytest.mark.parametrize("rank", ["best", "median", "worst"])
 def test_figure_5_6_is_a_crop_with_what_each_geneo_answers(finished, rank):
-    scene = read_json(finished.results / "scenes" / f"{rank}.json")
+    scene = read_json(finished.results / "interactive_crop" / f"{rank}.json")
     assert list(scene["shares"]) == ["cylinder", "arrow", "negative_sphere"]
 
 

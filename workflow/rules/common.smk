@@ -1,67 +1,64 @@
-"""What all rules share: the configuration, the surveys, and the identity of a job."""
+"""What all rules share: the configuration, the surveys, and the identity of a job.
+
+Paths of the workflow itself start from its own folder, so that another repository can use it as a
+module. Paths of surveys and results start from the working directory.
+"""
 
 import json
 import re
 from functools import cache
 from pathlib import Path
 
+import yaml
 from snakemake.exceptions import WorkflowError
 
 from scenenet.core.code_hash import code_hash
-from scenenet.config.schema import load
+from scenenet.config.schema import load, merged
 from scenenet.core.errors import InputError
-from scenenet.figures import CROP_RANKS, plan
+from scenenet.figures import CROP_RANKS
 from scenenet.core.files import digest
 from scenenet.core.provenance import fingerprint
-from scenenet.results.folder import Results
+from scenenet.results.tables import print_scores
 from scenenet.config.survey_sheet import read_surveys
-from scenenet.results.tables import TABLES as TABLE_NAMES
 
-try:
-    settings = load(config)
-    SURVEYS = {survey.name: survey for survey in read_surveys(settings)}
-    THESIS = {"thesis": fingerprint(settings.thesis)}
-except InputError as error:
-    raise WorkflowError(str(error)) from None
+WORKFLOW = Path(workflow.current_basedir).parent
+PROJECT = WORKFLOW.parent
 
-R = settings.results_dir
-SETTINGS = settings.plain()
-SCRIPTS = Path(workflow.basedir) / "workflow" / "scripts"
-# Sorted, so that the order of the rows decides on nothing.
-TRAIN = sorted(name for name, survey in SURVEYS.items() if survey.role == "train")
-NEW = sorted(name for name, survey in SURVEYS.items() if survey.role == "new")
-GRID = settings.voxels.label
 
-if not TRAIN:
-    raise WorkflowError(
-        "no survey has the role train, so there is nothing to learn from. Add a labelled survey to "
-        f"{settings.surveys or 'a survey sheet'}, or set ts40k_dir. To classify a survey with a "
-        "model that is there already: scenenet predict SURVEY --model MODEL.json --out FOLDER"
-    )
+def with_defaults(given):
+    """A configuration, completed with the one that comes with the workflow."""
+    complete = {}
+    for name in ("studies.yaml", "config.yaml"):
+        defaults = yaml.safe_load((PROJECT / "config" / name).read_text(encoding="utf-8"))
+        complete = merged(complete, defaults)
+    return merged(complete, given)
+
+
+def own_file(path):
+    """A file that the configuration names, or the one that comes with the workflow if the working
+    directory has none. It stays where it is when a module is used with a prefix."""
+    return local(path if Path(path).exists() else str(PROJECT / path))
 
 
 def any_of(names):
     """A regular expression for a wildcard that is one of ``names``; without names, for nothing."""
-    return "|".join(map(re.escape, names)) or "(?!)"
+    return "|".join(re.escape(str(name)) for name in names) or "(?!)"
 
 
-def models_of(kind):
-    return [model.name for model in settings.models if model.kind == kind]
+def trained_on(survey):
+    return SURVEYS[survey].role == "train"
 
 
-wildcard_constraints:
-    survey=any_of(SURVEYS),
-    synthetic=any_of(survey.name for survey in settings.synthetic.surveys),
-    model=any_of(model.name for model in settings.models),
-    contest=any_of(settings.contests()),
-    study=any_of(study.name for study in settings.studies),
-    seed=r"\d+",
+def has_map(survey):
+    """Whether a map of the survey can be drawn: TS40K samples are single crops."""
+    path = SURVEYS[survey].path
+    return not Path(path).is_dir() and not path.endswith((".npy", ".pt"))
 
 
 @cache
 def code_of(script):
     """Digest of a script and of all the code of the package that it uses."""
-    return code_hash([SCRIPTS / f"{script}.py"])
+    return code_hash([WORKFLOW / "scripts" / f"{script}.py"])
 
 
 def job(stage, settings, **identity):
@@ -73,15 +70,15 @@ def job(stage, settings, **identity):
 
 
 def source(survey):
-    """A survey as an input. One that somebody brought counts by its content, which is among the
-    parameters (see ``source_print``), and not by its date."""
+    """A survey as an input. A recorded survey is known by its content, which is among the parameters
+    (see ``source_print``), and not by its date; a prefix of a module does not move it."""
     path = SURVEYS[survey].path
-    return path if SURVEYS[survey].origin == "synthetic" else ancient(path)
+    return path if SURVEYS[survey].origin == "synthetic" else ancient(local(path))
 
 
 @cache
 def source_print(survey):
-    """What a survey is known by: its fingerprint, or what a synthetic one is made from."""
+    """What identifies a survey: its fingerprint, or the recipe of a synthetic one."""
     if SURVEYS[survey].origin == "synthetic":
         return f"recipe:{digest(synthetic_settings(Path(SURVEYS[survey].path).stem))}"
     return fingerprint(SURVEYS[survey].path, settings.content_below * 1024**2)
@@ -95,8 +92,16 @@ def model_settings(name):
     return settings.model_named(name).model_dump(mode="json")
 
 
+def study_settings(name):
+    return settings.study_named(name).model_dump(mode="json")
+
+
+def models_of(kind):
+    return [model.name for model in settings.models if model.kind == kind]
+
+
 def suffix_of(model):
-    return ".json" if settings.model_named(model).kind == "scenenet" else ".safetensors"
+    return MODEL_SUFFIXES[settings.model_named(model).kind]
 
 
 def tuned_file(model, seed):
@@ -107,5 +112,56 @@ def champion_file(model):
     return f"{R}/models/{model}{suffix_of(model)}"
 
 
-include: "gathered.smk"
-include: "shown.smk"
+MODEL_SUFFIXES = {"scenenet": ".json", "cnn": ".safetensors"}
+# The name of a model has no dot, so this folder is never that of a model.
+BOOSTED_TREES = "boosted.trees"
+
+try:
+    settings = load(with_defaults(config))
+    SURVEYS = {survey.name: survey for survey in read_surveys(settings)}
+    THESIS = {"thesis": fingerprint(own_file(settings.thesis))}
+except InputError as error:
+    raise WorkflowError(str(error)) from None
+
+R = settings.results_dir
+SETTINGS = settings.plain()
+GRID = settings.voxels.label
+# Sorted, so that the order of the rows in the survey sheet does not matter.
+TRAIN = sorted(filter(trained_on, SURVEYS))
+NEW = sorted(set(SURVEYS) - set(TRAIN))
+EXPERIMENTS = settings.contests()
+CROSS_VALIDATED = {
+    **{model.name: model.model_dump(mode="json") for model in settings.crossed_models()},
+    BOOSTED_TREES: None,
+}
+
+# Wildcard -> its values. A rule that is for some of them only says so in its own constraints.
+VALUES = {
+    "survey": [*TRAIN, *NEW],
+    "model": [model.name for model in settings.models],
+    "seed": list(settings.seeds),
+    "study": [study.name for study in settings.studies],
+    "experiment": EXPERIMENTS,
+    "contender": [*CROSS_VALIDATED] if "cross_validation" in EXPERIMENTS else [],
+    "noise_seed": list(settings.noise.seeds) if "noise" in EXPERIMENTS else [],
+    "rank": list(CROP_RANKS),
+}
+
+if not TRAIN:
+    raise WorkflowError(
+        "no survey has the role train, so there is no training data. Add a labelled survey to "
+        f"{settings.surveys or 'a survey sheet'}, or set ts40k_dir. To classify a survey with an "
+        "existing model: scenenet predict SURVEY --model MODEL.json --out FOLDER"
+    )
+
+
+wildcard_constraints:
+    synthetic=any_of(survey.name for survey in settings.synthetic.surveys),
+    survey=any_of(VALUES["survey"]),
+    model=any_of(VALUES["model"]),
+    study=any_of(VALUES["study"]),
+    experiment=any_of(VALUES["experiment"]),
+    contender=any_of(VALUES["contender"]),
+    rank=any_of(VALUES["rank"]),
+    seed=r"\d+",
+    noise_seed=r"\d+",

@@ -1,4 +1,4 @@
-"""The dataset: towers, their surroundings, grids, and the parts (thesis 5.1)."""
+"""The dataset: towers, crops around them, voxel grids, and the split (thesis 5.1)."""
 
 
 rule towers:
@@ -11,6 +11,10 @@ rule towers:
         f"{R}/logs/towers/{{survey}}.log",
     benchmark:
         f"{R}/benchmarks/towers/{{survey}}.tsv"
+    wildcard_constraints:
+        survey=any_of(TRAIN),
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
@@ -40,6 +44,10 @@ rule crops:
         f"{R}/logs/crops/{{survey}}.log",
     benchmark:
         f"{R}/benchmarks/crops/{{survey}}.tsv"
+    wildcard_constraints:
+        survey=any_of(TRAIN),
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
@@ -53,7 +61,7 @@ rule crops:
             input={"survey": source_print(w.survey)},
         ),
     message:
-        "Cutting out the surroundings of the towers of {wildcards.survey}"
+        "Cropping {wildcards.survey} around its towers"
     script:
         "../scripts/crops.py"
 
@@ -70,21 +78,25 @@ rule voxels:
         f"{R}/logs/voxels/{{survey}}-{GRID}.log",
     benchmark:
         f"{R}/benchmarks/voxels/{{survey}}-{GRID}.tsv"
+    wildcard_constraints:
+        survey=any_of(TRAIN),
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=2000,
         runtime=60,
     params:
-        job=lambda w: job("voxels", SETTINGS["voxels"]),
+        job=job("voxels", SETTINGS["voxels"]),
     message:
-        "Laying grids over the crops of {wildcards.survey}"
+        "Voxelising the crops of {wildcards.survey}"
     script:
         "../scripts/voxels.py"
 
 
 rule split:
     input:
-        manifests=CROP_MANIFESTS,
+        manifests=every("crops", "manifest"),
     output:
         split=f"{R}/split/split.csv",
         provenance=f"{R}/split/provenance.json",
@@ -92,6 +104,8 @@ rule split:
         f"{R}/logs/split.log",
     benchmark:
         f"{R}/benchmarks/split.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=1000,
@@ -99,29 +113,31 @@ rule split:
     params:
         job=job("split", SETTINGS["split"], seed=SETTINGS["split"]["seed"]),
     message:
-        "Sharing the crops out to training, validation and test"
+        "Splitting the crops into training, validation and test"
     script:
         "../scripts/split.py"
 
 
-rule grid_times:
+rule voxelisation_time:
     input:
-        stores=CROP_STORES,
-        manifests=CROP_MANIFESTS,
+        stores=every("crops", "store"),
+        manifests=every("crops", "manifest"),
     output:
-        times=f"{R}/times/grids.csv",
-        provenance=f"{R}/times/grids.provenance.json",
+        times=f"{R}/voxelisation_time/times.csv",
+        provenance=f"{R}/voxelisation_time/provenance.json",
     log:
-        f"{R}/logs/grid_times.log",
+        f"{R}/logs/voxelisation_time.log",
     benchmark:
-        f"{R}/benchmarks/grid_times.tsv"
+        f"{R}/benchmarks/voxelisation_time.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=2000,
         runtime=60,
     params:
-        job=job("grid_times", {}),
+        job=job("voxelisation_time", {}),
     message:
-        "Timing how crops become voxels"
+        "Timing the voxelisation of the crops"
     script:
-        "../scripts/grid_times.py"
+        "../scripts/voxelisation_time.py"

@@ -7,14 +7,14 @@ rule predict:
         model=champion_file(settings.predict.model),
     output:
         survey=f"{R}/predict/{{survey}}/{{survey}}.laz",
-        towers=shown(
+        towers=in_report(
             f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
             "prediction-towers",
             "predictions",
             "Files",
             {"survey": "{survey}", "file": "Towers"},
         ),
-        summary=shown(
+        summary=in_report(
             f"{R}/predict/{{survey}}/{{survey}}.summary.json",
             "prediction-summary",
             "predictions",
@@ -28,6 +28,8 @@ rule predict:
         f"{R}/benchmarks/predict/{{survey}}.tsv"
     wildcard_constraints:
         survey=any_of(NEW),
+    conda:
+        "../envs/scenenet.yaml"
     threads: 2
     resources:
         mem_mb=4000,

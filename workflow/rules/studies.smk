@@ -3,21 +3,23 @@
 
 rule study:
     input:
-        stores=CROP_STORES,
-        manifests=CROP_MANIFESTS,
+        stores=every("crops", "store"),
+        manifests=every("crops", "manifest"),
     output:
-        runs=shown(
-            f"{R}/studies/{{study}}/runs.csv",
+        runs=in_report(
+            f"{R}/study/{{study}}/runs.csv",
             "study-runs",
             "studies",
             "Trainings",
             lambda w: {"study": w.study, "asks": title_of_study(w.study)},
         ),
-        provenance=f"{R}/studies/{{study}}/provenance.json",
+        provenance=f"{R}/study/{{study}}/provenance.json",
     log:
         f"{R}/logs/study/{{study}}.log",
     benchmark:
         f"{R}/benchmarks/study/{{study}}.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
@@ -25,12 +27,12 @@ rule study:
     params:
         job=lambda w: job(
             "study",
-            settings.study_named(w.study).model_dump(mode="json"),
+            study_settings(w.study),
             model=model_settings(settings.study_named(w.study).model),
             voxels=SETTINGS["voxels"],
             split=SETTINGS["split"],
         ),
     message:
-        "Study {wildcards.study}"
+        "Running the study {wildcards.study}"
     script:
         "../scripts/study.py"

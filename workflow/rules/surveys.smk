@@ -11,6 +11,8 @@ rule synthesize:
         f"{R}/logs/synthesize/{{synthetic}}.log",
     benchmark:
         f"{R}/benchmarks/synthesize/{{synthetic}}.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
@@ -39,6 +41,8 @@ rule check:
         f"{R}/logs/check/{{survey}}.log",
     benchmark:
         f"{R}/benchmarks/check/{{survey}}.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,

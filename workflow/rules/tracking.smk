@@ -1,41 +1,42 @@
 """MLflow: the store, and a run for every training."""
 
-SQLITE = "sqlite:///"
-STORE = {"store": f"{R}/mlflow/store.json"}
-if settings.tracking.uri.startswith(SQLITE):
-    # Deleting the database makes it, its record and all runs anew. It is updated and not replaced,
-    # because it holds the runs of other data and of other people as well; nothing depends on its
-    # date, so that what others log does not rerun anything.
-    STORE["database"] = settings.tracking.uri.removeprefix(SQLITE)
-
 
 rule mlflow_store:
     output:
-        **{name: update(file) if name == "database" else file for name, file in STORE.items()},
+        **database(),
+        store=f"{R}/mlflow/store.json",
     log:
         f"{R}/logs/mlflow_store.log",
     benchmark:
         f"{R}/benchmarks/mlflow_store.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=2000,
         runtime=10,
     params:
-        job=job("mlflow_store", SETTINGS["tracking"], studies=[*STUDIED, *CONTESTS]),
+        job=job(
+            "mlflow_store",
+            SETTINGS["tracking"],
+            studies=[*VALUES["study"], *EXPERIMENTS],
+        ),
     message:
-        "Making the MLflow store"
+        "Creating the MLflow store"
     script:
         "../scripts/mlflow_store.py"
 
 
 rule track:
     input:
-        **pictures(MODEL_FIGURES),
+        **pictures(model_figures()),
         store=f"{R}/mlflow/store.json",
-        trainings=TRAININGS,
-        tunings=TUNINGS,
-        scores=SCORES,
-        black_box=BOOSTED_TREES,
+        trainings=every("train", "history"),
+        records=every("train", "provenance"),
+        tunings=every("tune", "tuning"),
+        models=every("tune", "model"),
+        scores=every("evaluate", "scores"),
+        boosted_trees=every("boosted_trees", "scores"),
     output:
         runs=f"{R}/mlflow/runs.json",
         provenance=f"{R}/mlflow/provenance.json",
@@ -43,6 +44,8 @@ rule track:
         f"{R}/logs/track.log",
     benchmark:
         f"{R}/benchmarks/track.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -52,13 +55,13 @@ rule track:
             "track",
             SETTINGS["tracking"],
             dataset=settings.dataset,
-            protocol=PROTOCOL,
+            protocol=protocol(),
             common_settings={
                 model.name: {"voxels": SETTINGS["voxels"], "split": SETTINGS["split"]}
                 for model in settings.models
             },
-            results=gathered(),
-            pictures=MODEL_FIGURES,
+            results=results_of(),
+            pictures=model_figures(),
         ),
     message:
         "Logging every training to MLflow"
@@ -68,17 +71,19 @@ rule track:
 
 rule track_studies:
     input:
-        **pictures([f"study-{study}" for study in STUDIED]),
+        **pictures(f"study-{study}" for study in VALUES["study"]),
         store=f"{R}/mlflow/store.json",
-        runs=STUDIES,
-        records=expand(f"{R}/studies/{{study}}/provenance.json", study=STUDIED),
+        runs=every("study", "runs"),
+        records=every("study", "provenance"),
     output:
-        runs=TRACKED_STUDIES,
+        runs=expand(f"{R}/mlflow/study-{{study}}.json", study=VALUES["study"]),
         provenance=f"{R}/mlflow/studies.provenance.json",
     log:
         f"{R}/logs/track_studies.log",
     benchmark:
         f"{R}/benchmarks/track_studies.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=2000,
@@ -88,7 +93,7 @@ rule track_studies:
             "track_studies",
             SETTINGS["tracking"],
             dataset=settings.dataset,
-            protocol=PROTOCOL,
+            protocol=protocol(),
             studies=SETTINGS["studies"],
         ),
     message:
@@ -97,11 +102,46 @@ rule track_studies:
         "../scripts/track_studies.py"
 
 
+rule track_experiment:
+    input:
+        store=f"{R}/mlflow/store.json",
+        runs=f"{R}/{{experiment}}/runs.csv",
+        joined=f"{R}/{{experiment}}/provenance.json",
+        record=lambda w: every(w.experiment, "provenance")[0],
+        pictures=f"{R}/figures/{{experiment}}.png",
+        captions=f"{R}/figures/{{experiment}}.json",
+    output:
+        runs=f"{R}/mlflow/{{experiment}}.json",
+        provenance=f"{R}/mlflow/{{experiment}}.provenance.json",
+    log:
+        f"{R}/logs/track_experiment/{{experiment}}.log",
+    benchmark:
+        f"{R}/benchmarks/track_experiment/{{experiment}}.tsv"
+    conda:
+        "../envs/scenenet.yaml"
+    threads: 1
+    resources:
+        mem_mb=2000,
+        runtime=30,
+    params:
+        job=lambda w: job(
+            "track_experiment",
+            SETTINGS["tracking"],
+            dataset=settings.dataset,
+            experiment=w.experiment,
+        ),
+    message:
+        "Logging the experiment {wildcards.experiment} to MLflow"
+    script:
+        "../scripts/track_experiment.py"
+
+
 rule register:
     input:
         runs=f"{R}/mlflow/runs.json",
-        tunings=TUNINGS,
-        scores=SCORES,
+        tunings=every("tune", "tuning"),
+        models=every("tune", "model"),
+        scores=every("evaluate", "scores"),
     output:
         registry=f"{R}/mlflow/registry.json",
         provenance=f"{R}/mlflow/registry.provenance.json",
@@ -109,12 +149,19 @@ rule register:
         f"{R}/logs/register.log",
     benchmark:
         f"{R}/benchmarks/register.tsv"
+    conda:
+        "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=2000,
         runtime=10,
     params:
-        job=job("register", SETTINGS["tracking"], dataset=settings.dataset, results=gathered()),
+        job=job(
+            "register",
+            SETTINGS["tracking"],
+            dataset=settings.dataset,
+            results=results_of(),
+        ),
     message:
         "Registering the best models in MLflow"
     script:

@@ -1,13 +1,13 @@
-"""Work out which promises of a GENEO a model keeps."""
+"""Verify which properties of a GENEO a model has."""
 
-import adapter
+import _job
 
 
-def certificate(job: adapter.Job) -> None:
+def certificate(job: _job.Job) -> None:
     from scenenet.core.files import write_json
     from scenenet.interpretability.certificate import certificate
 
     write_json(job.output.certificate, certificate(job.input.model))
 
 
-adapter.run(certificate)
+_job.run(certificate)

@@ -1,12 +1,12 @@
-"""Pick the seed of a model that is best on the validation part."""
+"""Choose the seed of a model that is best on the validation part."""
 
-import adapter
+import _job
 
 
-def champion(job: adapter.Job) -> None:
+def champion(job: _job.Job) -> None:
     from scenenet.training.tuning import champion
 
     champion(job.input.models, job.input.tunings, job.output.model)
 
 
-adapter.run(champion)
+_job.run(champion)

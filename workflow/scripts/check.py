@@ -1,9 +1,9 @@
-"""Report what is in a survey and what is odd about it."""
+"""Report what is in a survey, and its faults."""
 
-import adapter
+import _job
 
 
-def check(job: adapter.Job) -> None:
+def check(job: _job.Job) -> None:
     from scenenet.core.files import atomic, write_json
     from scenenet.pointcloud.quality.check import CheckSettings, check_survey
 
@@ -13,4 +13,4 @@ def check(job: adapter.Job) -> None:
         report.classes.to_csv(partial, index=False)
 
 
-adapter.run(check)
+_job.run(check)

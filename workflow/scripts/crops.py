@@ -1,9 +1,9 @@
-"""Cut the surroundings of each tower out of a survey."""
+"""Crop a survey around each tower."""
 
-import adapter
+import _job
 
 
-def crops(job: adapter.Job) -> None:
+def crops(job: _job.Job) -> None:
     import pandas as pd
 
     from scenenet.dataset.crops import CropSettings, cut_crops
@@ -19,4 +19,4 @@ def crops(job: adapter.Job) -> None:
     )
 
 
-adapter.run(crops)
+_job.run(crops)

@@ -1,9 +1,9 @@
 """Score a tuned model on the test part."""
 
-import adapter
+import _job
 
 
-def evaluate(job: adapter.Job) -> None:
+def evaluate(job: _job.Job) -> None:
     from scenenet.core.files import write_json
     from scenenet.detection.settings import DetectionSettings
     from scenenet.evaluation.scoring import evaluate
@@ -18,4 +18,4 @@ def evaluate(job: adapter.Job) -> None:
     write_json(job.output.scores, scores)
 
 
-adapter.run(evaluate)
+_job.run(evaluate)

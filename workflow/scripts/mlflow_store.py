@@ -1,9 +1,9 @@
-"""Make the MLflow store before anything logs to it."""
+"""Create the MLflow store before any job logs to it."""
 
-import adapter
+import _job
 
 
-def mlflow_store(job: adapter.Job) -> None:
+def mlflow_store(job: _job.Job) -> None:
     from scenenet.tracking import TrackingSettings, create_store
     from scenenet.tracking.study_runs import experiment_of
 
@@ -12,4 +12,4 @@ def mlflow_store(job: adapter.Job) -> None:
     create_store(settings, job.output.store, names)
 
 
-adapter.run(mlflow_store)
+_job.run(mlflow_store)

@@ -1,9 +1,9 @@
 """Classify a survey and list its towers."""
 
-import adapter
+import _job
 
 
-def predict(job: adapter.Job) -> None:
+def predict(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
     from scenenet.prediction.predict import predict_survey
     from scenenet.prediction.settings import PredictSettings
@@ -19,4 +19,4 @@ def predict(job: adapter.Job) -> None:
     )
 
 
-adapter.run(predict)
+_job.run(predict)

@@ -1,10 +1,10 @@
-"""Bring the best of each model and of all into MLflow's registry."""
+"""Register the best seed of each model, and the best model, in MLflow."""
 
-import adapter
-from gathered import results_of
+import _job
+from _results import results_of
 
 
-def register(job: adapter.Job) -> None:
+def register(job: _job.Job) -> None:
     from scenenet.tracking import TrackingSettings
     from scenenet.tracking.registry import register_champions
 
@@ -13,4 +13,4 @@ def register(job: adapter.Job) -> None:
     register_champions(settings, results_of(job), dataset, job.input.runs, job.output.registry)
 
 
-adapter.run(register)
+_job.run(register)

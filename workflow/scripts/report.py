@@ -1,10 +1,10 @@
-"""Write the page with every table and figure."""
+"""Write the report: one page with every table and figure."""
 
-import adapter
-from gathered import results_of
+import _job
+from _results import results_of
 
 
-def report(job: adapter.Job) -> None:
+def report(job: _job.Job) -> None:
     from scenenet.experiments.published import read_thesis
     from scenenet.report import write_report
 
@@ -12,4 +12,4 @@ def report(job: adapter.Job) -> None:
     write_report(results_of(job), thesis, job.output.report)
 
 
-adapter.run(report)
+_job.run(report)

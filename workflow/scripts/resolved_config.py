@@ -1,12 +1,12 @@
-"""Write down all settings of the run, defaults included."""
+"""Write all settings of the run to a file, defaults included."""
 
-import adapter
+import _job
 
 
-def resolved_config(job: adapter.Job) -> None:
+def resolved_config(job: _job.Job) -> None:
     from scenenet.core.provenance import write_settings
 
     write_settings(job.output.config, job.settings)
 
 
-adapter.run(resolved_config)
+_job.run(resolved_config)

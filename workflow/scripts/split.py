@@ -1,9 +1,9 @@
-"""Share the crops out to training, validation and test."""
+"""Split the crops into training, validation and test."""
 
-import adapter
+import _job
 
 
-def split(job: adapter.Job) -> None:
+def split(job: _job.Job) -> None:
     from scenenet.core.files import atomic
     from scenenet.dataset.split import SplitSettings, split_crops
 
@@ -12,4 +12,4 @@ def split(job: adapter.Job) -> None:
         table.to_csv(partial, index=False)
 
 
-adapter.run(split)
+_job.run(split)

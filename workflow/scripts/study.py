@@ -1,9 +1,9 @@
 """Run the trainings of one study."""
 
-import adapter
+import _job
 
 
-def study(job: adapter.Job) -> None:
+def study(job: _job.Job) -> None:
     from scenenet.dataset.split import SplitSettings
     from scenenet.dataset.voxels import VoxelSettings
     from scenenet.experiments.studies.run import run_study
@@ -20,4 +20,4 @@ def study(job: adapter.Job) -> None:
     )
 
 
-adapter.run(study)
+_job.run(study)

@@ -1,9 +1,9 @@
 """Make a synthetic survey."""
 
-import adapter
+import _job
 
 
-def synthesize(job: adapter.Job) -> None:
+def synthesize(job: _job.Job) -> None:
     from scenenet.synthetic import SyntheticSettings, make_survey
 
     make_survey(
@@ -15,4 +15,4 @@ def synthesize(job: adapter.Job) -> None:
     )
 
 
-adapter.run(synthesize)
+_job.run(synthesize)

@@ -1,10 +1,10 @@
-"""Write the tables of thesis chapter 5, with the thesis' numbers beside ours."""
+"""Write the tables of thesis chapter 5, with the thesis' numbers beside this run's."""
 
-import adapter
-from gathered import results_of
+import _job
+from _results import results_of
 
 
-def tables(job: adapter.Job) -> None:
+def tables(job: _job.Job) -> None:
     from scenenet.experiments.published import read_thesis
     from scenenet.results.tables import write_tables
     from scenenet.results.thesis_comparison import write_comparison
@@ -14,4 +14,4 @@ def tables(job: adapter.Job) -> None:
     write_comparison(results, thesis, job.output.comparison)
 
 
-adapter.run(tables)
+_job.run(tables)

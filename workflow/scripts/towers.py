@@ -1,9 +1,9 @@
 """Find and measure the labelled towers of a survey."""
 
-import adapter
+import _job
 
 
-def towers(job: adapter.Job) -> None:
+def towers(job: _job.Job) -> None:
     from scenenet.core.files import atomic
     from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 
@@ -12,4 +12,4 @@ def towers(job: adapter.Job) -> None:
         table.to_csv(partial, index=False)
 
 
-adapter.run(towers)
+_job.run(towers)

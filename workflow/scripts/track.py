@@ -1,15 +1,15 @@
-"""Bring every training into MLflow."""
+"""Log every training to MLflow."""
 
-import adapter
-from gathered import results_of
+import _job
+from _results import results_of
 
 NOTE = (
-    "Every training: a run for each model with the mean and spread over its seeds, and under it "
-    "one for each seed. The black box is boosted trees on features of the voxels, to compare with."
+    "Every training: a run for each model with the mean and spread over its seeds, and nested in "
+    "it a run for each seed. The boosted trees on features of the voxels are the baseline."
 )
 
 
-def track(job: adapter.Job) -> None:
+def track(job: _job.Job) -> None:
     from scenenet.figures import read_pictures
     from scenenet.tracking import TrackingSettings, log_runs, model_groups
 
@@ -25,4 +25,4 @@ def track(job: adapter.Job) -> None:
     log_runs(settings, groups, job.output.runs, job.input.store, NOTE)
 
 
-adapter.run(track)
+_job.run(track)

@@ -1,9 +1,9 @@
-"""Bring every study into MLflow, each into an experiment of its own."""
+"""Log every study to MLflow, each as an MLflow experiment of its own."""
 
-import adapter
+import _job
 
 
-def track_studies(job: adapter.Job) -> None:
+def track_studies(job: _job.Job) -> None:
     from pathlib import Path
 
     from scenenet.experiments.studies.settings import StudySettings
@@ -28,4 +28,4 @@ def track_studies(job: adapter.Job) -> None:
         log_runs(own, groups, logged, job.input.store, note_of(study))
 
 
-adapter.run(track_studies)
+_job.run(track_studies)

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-import adapter
+import _job
 
 
-def train(job: adapter.Job) -> None:
+def train(job: _job.Job) -> None:
     from scenenet.core.files import write_json
     from scenenet.core.peak_memory import used
     from scenenet.dataset.voxels import VoxelSettings
@@ -19,8 +19,8 @@ def train(job: adapter.Job) -> None:
         job.identity["seed"],
         job.output.model,
         job.output.history,
-        # No output of the rule, so that it outlives a job that was stopped; it knows by itself
-        # which training it belongs to.
+        # Not an output of the rule, so that it survives a job that was stopped. The file itself
+        # says which training it belongs to.
         checkpoint=Path(job.output.history).with_name("checkpoint.safetensors"),
         grid=VoxelSettings(**job.identity["grid"]),
         provenance=job.made_by(),
@@ -28,4 +28,4 @@ def train(job: adapter.Job) -> None:
     write_json(job.output.resources, used())
 
 
-adapter.run(train)
+_job.run(train)

@@ -1,9 +1,9 @@
 """Choose the detection threshold of a trained model on the validation part."""
 
-import adapter
+import _job
 
 
-def tune(job: adapter.Job) -> None:
+def tune(job: _job.Job) -> None:
     from scenenet.models.settings import TuningSettings
     from scenenet.training.tuning import tune
 
@@ -17,4 +17,4 @@ def tune(job: adapter.Job) -> None:
     )
 
 
-adapter.run(tune)
+_job.run(tune)

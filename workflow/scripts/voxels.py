@@ -1,13 +1,13 @@
-"""Lay a grid over each crop of a survey."""
+"""Voxelise each crop of a survey."""
 
-import adapter
+import _job
 
 
-def voxels(job: adapter.Job) -> None:
+def voxels(job: _job.Job) -> None:
     from scenenet.dataset.voxel_cache import build
     from scenenet.dataset.voxels import VoxelSettings
 
     build(job.input.manifest, VoxelSettings(**job.settings), job.output.store, job.output.manifest)
 
 
-adapter.run(voxels)
+_job.run(voxels)

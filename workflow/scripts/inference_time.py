@@ -1,13 +1,13 @@
 """Time a model on test crops."""
 
-import adapter
+import _job
 
 
-def timing(job: adapter.Job) -> None:
+def inference_time(job: _job.Job) -> None:
     from scenenet.core.files import write_json
     from scenenet.evaluation.inference_time import time_model
 
     write_json(job.output.times, time_model(job.input.model, job.input.manifests, job.input.split))
 
 
-adapter.run(timing)
+_job.run(inference_time)

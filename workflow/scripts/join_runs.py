@@ -1,9 +1,9 @@
-"""Put the rows of a contest's jobs into one table, in the order of the jobs."""
+"""Join the runs of the jobs of an experiment into one table, in the order of the jobs."""
 
-import adapter
+import _job
 
 
-def contest_runs(job: adapter.Job) -> None:
+def join_runs(job: _job.Job) -> None:
     import pandas as pd
 
     from scenenet.core.files import atomic
@@ -13,4 +13,4 @@ def contest_runs(job: adapter.Job) -> None:
         pd.concat([read_table(runs) for runs in job.input.runs]).to_csv(partial, index=False)
 
 
-adapter.run(contest_runs)
+_job.run(join_runs)

@@ -1,9 +1,9 @@
-"""Train one model on every fold of the crops and score it on those left out."""
+"""Train one model on every fold of the crops and score it on the crops left out."""
 
-import adapter
+import _job
 
 
-def cross_validate(job: adapter.Job) -> None:
+def cross_validation(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
     from scenenet.experiments.cross_validation.run import cross_validate
     from scenenet.models.settings import ModelSettings
@@ -20,4 +20,4 @@ def cross_validate(job: adapter.Job) -> None:
     )
 
 
-adapter.run(cross_validate)
+_job.run(cross_validation)

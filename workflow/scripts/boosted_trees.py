@@ -1,9 +1,9 @@
-"""Train and score the black box that SCENE-Net is measured against."""
+"""Train and score the boosted trees, the baseline that SCENE-Net is compared with."""
 
-import adapter
+import _job
 
 
-def black_box(job: adapter.Job) -> None:
+def boosted_trees(job: _job.Job) -> None:
     from scenenet.baselines.evaluate import evaluate_boosted_trees
     from scenenet.detection.settings import DetectionSettings
 
@@ -17,4 +17,4 @@ def black_box(job: adapter.Job) -> None:
     )
 
 
-adapter.run(black_box)
+_job.run(boosted_trees)

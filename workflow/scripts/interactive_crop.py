@@ -1,10 +1,10 @@
-"""Make one test crop ready for the page's 3D view."""
+"""Export one test crop for the 3D view of the report."""
 
-import adapter
-from gathered import results_of
+import _job
+from _results import results_of
 
 
-def scene(job: adapter.Job) -> None:
+def interactive_crop(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
     from scenenet.figures.interactive_crop import write_scene
 
@@ -12,9 +12,9 @@ def scene(job: adapter.Job) -> None:
         results_of(job),
         job.identity["model"],
         job.identity["rank"],
-        job.output.scene,
+        job.output.crop,
         DetectionSettings(**job.settings),
     )
 
 
-adapter.run(scene)
+_job.run(interactive_crop)

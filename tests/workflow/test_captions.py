@@ -11,17 +11,26 @@ import pytest
 pytestmark = pytest.mark.workflow
 
 NOWHERE = "http://127.0.0.1:9"
-"""A proxy at which nobody answers: whatever asks the network for something fails."""
+"""A proxy that does not exist, so that every access to the network fails."""
 
 
-@pytest.fixture
-def shown(project, tmp_path, monkeypatch) -> dict[str, dict]:
-    """Path of a result -> what the report has of it, category and subcategory included."""
-    for name in ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY"):
-        monkeypatch.setenv(name, NOWHERE)
-    monkeypatch.setenv("no_proxy", "")
-    project.run("--report", str(tmp_path / "out.html"))
-    html = (tmp_path / "out.html").read_text(encoding="utf-8")
+@pytest.fixture(scope="module")
+def reported(copied):
+    """A copy of the finished project whose report is made, without access to a network."""
+    proxies = ("http_proxy", "https_proxy", "HTTP_PROXY", "HTTPS_PROXY", "ALL_PROXY")
+    with pytest.MonkeyPatch.context() as environment:
+        for name in proxies:
+            environment.setenv(name, NOWHERE)
+        environment.setenv("no_proxy", "")
+        project = copied()
+        project.run("--report", "out.html")
+    return project
+
+
+@pytest.fixture(scope="module")
+def shown(reported) -> dict[str, dict]:
+    """Path of a result -> its entry in the report, with category and subcategory."""
+    html = (reported.folder / "out.html").read_text(encoding="utf-8")
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=[\"']http", html)
     results = _variable(html, "results")
     for category, groups in _variable(html, "categories").items():
@@ -36,18 +45,18 @@ def _variable(html: str, name: str) -> dict:
     return json.JSONDecoder().raw_decode(html, begin.end())[0]
 
 
-def test_the_report_has_everything_with_words_for_it_and_changes_nothing(project, shown):
+def test_the_report_has_everything_with_words_for_it_and_changes_nothing(reported, shown):
     made = [
-        *project.results.glob("tables/*.csv"),
-        *project.results.glob("figures/*.png"),
-        *project.results.glob("studies/*/runs.csv"),
-        *project.results.glob("predict/*/*.towers.geojson"),
-        project.results / "report/index.html",
-        project.results / "models/scenenet.json",
-        project.results / "config.yaml",
+        *reported.results.glob("tables/*.csv"),
+        *reported.results.glob("figures/*.png"),
+        *reported.results.glob("study/*/runs.csv"),
+        *reported.results.glob("predict/*/*.towers.geojson"),
+        reported.results / "report/index.html",
+        reported.results / "models/scenenet.json",
+        reported.results / "config.yaml",
     ]
     assert len(made) > 25
-    missing = {str(path.relative_to(project.folder)) for path in made} - set(shown)
+    missing = {str(path.relative_to(reported.folder)) for path in made} - set(shown)
     assert missing == set()
     for path, entry in shown.items():
         said = re.sub(r"<[^>]+>", "", entry["caption"])
@@ -61,10 +70,10 @@ def test_the_report_has_everything_with_words_for_it_and_changes_nothing(project
     # Two with the same labels in one place would be one row, and one of them could not be opened.
     rows = [(e["category"], e["group"], *e["labels"].values()) for e in shown.values()]
     assert len(rows) == len(set(rows))
-    assert project.planned() == {}
+    assert reported.planned() == {}
 
 
-def test_captions_speak_of_their_own_result(shown):
+def test_captions_describe_their_own_result(shown):
     assert "own" in shown["results/figures/prediction-own.png"]["caption"]
     assert "ablations" in shown["results/figures/study-ablations.png"]["caption"]
     assert "0, 1" in shown["results/tables/models.csv"]["caption"]
@@ -76,7 +85,7 @@ def test_captions_speak_of_their_own_result(shown):
 
 def test_another_caption_reruns_nothing(project):
     project.edit("workflow/report/figure-crop.rst", "A test crop", "One of the test crops")
-    project.edit("workflow/rules/shown.smk", '"Towers found"', '"Found towers"')
+    project.edit("workflow/rules/captions.smk", '"Towers found"', '"Found towers"')
     assert project.planned() == {}
 
 

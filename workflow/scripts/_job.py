@@ -1,7 +1,7 @@
 """What every script of the workflow does before and after its one call of the package.
 
-A script defines a function from a job to nothing and hands it to ``run``. It imports the package
-inside of that function, so that whatever goes wrong, down to a missing library, is in the log.
+A script defines a function that takes a job, and passes it to ``run``. It imports the package
+inside that function, so that every error, even a missing library, is in the log.
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
+# Last, so that an installed package comes first: an environment that Snakemake made has none.
+sys.path.append(str(Path(__file__).resolve().parents[2]))
+
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -26,12 +29,14 @@ THREAD_VARIABLES = (
 
 @dataclass(frozen=True)
 class Job:
-    """A job as Snakemake describes it; the configuration is no part of it, on purpose.
+    """A job as Snakemake describes it, without the configuration: a script that read it would
+    depend on settings that are not among its parameters.
 
     Attributes:
-        identity: the parameter ``job`` of the rule: stage, settings, code, and what else decides.
+        identity: the parameter ``job`` of the rule: stage, settings, code, and all else that the
+            result depends on.
         input, output: files by name; attribute access works as in Snakemake.
-        threads: how many it may use.
+        threads: number of threads that it may use.
     """
 
     identity: Mapping[str, Any]
@@ -45,7 +50,7 @@ class Job:
         return dict(self.identity["settings"])
 
     def made_by(self) -> dict[str, Any]:
-        """Settings, code and version, for a file that carries its own record."""
+        """Settings, code and version, for a file that has its own record."""
         from scenenet.core.files import digest
         from scenenet.core.provenance import package_version
 
@@ -56,7 +61,7 @@ class Job:
         }
 
     def record(self) -> dict[str, Any]:
-        """What the result was made from and by."""
+        """Inputs, settings and code of the result."""
         from scenenet.core import provenance
 
         made_by = self.made_by()
@@ -74,7 +79,10 @@ class Job:
         for name, files in self.input.items():
             if name in known:
                 yield name, known[name]
-            elif name not in ("store", "stores"):  # their manifests speak for them
+            elif name not in (
+                "store",
+                "stores",
+            ):  # their manifests have a digest of them
                 single = isinstance(files, str)
                 yield name, _print(files) if single else [_print(file) for file in files]
 
@@ -82,9 +90,9 @@ class Job:
 def run(stage: Callable[[Job], object]) -> None:
     """Call ``stage`` with the job that Snakemake started this process for, and write the record.
 
-    Standard output and error go to the log of the rule from the first moment on, those of other
-    processes and of compiled code included. Progress, which the package writes to ``sys.stderr``,
-    is shown on the terminal as well.
+    Standard output and error go to the log of the rule from the start, also those of child
+    processes and of compiled code. Progress, which the package writes to ``sys.stderr``, is shown
+    on the terminal as well.
     """
     import __main__
 
@@ -103,7 +111,7 @@ def run(stage: Callable[[Job], object]) -> None:
 
 
 class _Both:
-    """A text stream into the log and onto the terminal."""
+    """A text stream that writes to the log and to the terminal."""
 
     def __init__(self, *streams: TextIO) -> None:
         self._streams = streams
@@ -118,7 +126,7 @@ class _Both:
             stream.flush()
 
     def isatty(self) -> bool:
-        """Several jobs share the terminal, so there are lines and no bars."""
+        """False, so that progress is written as lines: several jobs share the terminal."""
         return False
 
 
@@ -137,7 +145,7 @@ def _redirect(path: str) -> TextIO:
 
 
 def _explain(log: TextIO, kind: type[BaseException], error: BaseException, trace: Any) -> None:
-    """The message is enough where the input is at fault; a traceback is for faults of the code."""
+    """Write the message of an input error, or the traceback of a fault in the code, to the log."""
     if kind.__name__ == "InputError":
         print(f"Error: {error}", file=log)
     else:
@@ -146,8 +154,8 @@ def _explain(log: TextIO, kind: type[BaseException], error: BaseException, trace
 
 
 def _print(path: str) -> str:
-    """Fingerprint of an input. Of a manifest, the digest of the data it stands for: the file also
-    holds the seconds that the work took."""
+    """Fingerprint of an input. That of a manifest is the digest of the data it describes, because
+    the file also has the seconds that the job took."""
     from scenenet.core.files import read_json
     from scenenet.core.provenance import fingerprint
 

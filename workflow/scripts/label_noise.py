@@ -1,9 +1,9 @@
-"""Train SCENE-Net and its rivals on labels of which a known share is wrong."""
+"""Train all models on labels of which a known share is wrong."""
 
-import adapter
+import _job
 
 
-def noise(job: adapter.Job) -> None:
+def label_noise(job: _job.Job) -> None:
     from scenenet.dataset.voxels import VoxelSettings
     from scenenet.experiments.label_noise.run import run_noise
     from scenenet.experiments.label_noise.settings import NoiseSettings
@@ -18,4 +18,4 @@ def noise(job: adapter.Job) -> None:
     )
 
 
-adapter.run(noise)
+_job.run(label_noise)

@@ -1,0 +1,46 @@
+"""The tables of thesis chapter 5, with the thesis' numbers beside this run's."""
+
+
+rule tables:
+    input:
+        checks=every("check", "classes", survey=TRAIN),
+        towers=every("towers", "towers"),
+        voxelisation_time=every("voxelisation_time", "times"),
+        split=every("split", "split"),
+        trainings=every("train", "history"),
+        records=every("train", "provenance"),
+        resources=every("train", "resources"),
+        tunings=every("tune", "tuning"),
+        models=every("tune", "model"),
+        scores=every("evaluate", "scores"),
+        studies=every("study", "runs"),
+        experiments=every("join_runs", "runs"),
+        boosted_trees=[*every("boosted_trees", "scores"), *every("boosted_trees", "times")],
+        certificates=every("certificate", "certificate"),
+        inference_time=every("inference_time", "times"),
+        thesis=ancient(own_file(settings.thesis)),
+    output:
+        tables=[table_in_report(f"{R}/tables/{name}.csv") for name in table_names()],
+        comparison=table_in_report(f"{R}/tables/thesis_and_ours.csv"),
+        provenance=f"{R}/tables/provenance.json",
+    log:
+        f"{R}/logs/tables.log",
+    benchmark:
+        f"{R}/benchmarks/tables.tsv"
+    conda:
+        "../envs/scenenet.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        job=job(
+            "tables",
+            {},
+            results=results_of(studies=VALUES["study"], experiments=EXPERIMENTS),
+            input=THESIS,
+        ),
+    message:
+        "Writing the tables"
+    script:
+        "../scripts/tables.py"

@@ -1,0 +1,147 @@
+"""The files that many jobs make, for the rules that read all of them.
+
+They are derived from the outputs of the rules and the values of the wildcards, so a new rule or output
+is a target without being listed anywhere.
+"""
+
+import re
+
+from snakemake.io import is_flagged
+
+from scenenet.figures import plan
+from scenenet.results.folder import Results
+from scenenet.results.tables import TABLES
+
+
+def every(stage, output, **values):
+    """Every file of an output of a stage: one for each combination of the values of its wildcards.
+
+    Args:
+        stage: name of a rule, or what the rules of both kinds of models are called without the kind.
+        output: name of the output.
+        values: wildcard -> values, if not all of them.
+    """
+    names = [stage] if rules.has(stage) else [f"{stage}_{kind}" for kind in MODEL_SUFFIXES]
+    return [file for name in names for file in _files(getattr(rules, name), output, values)]
+
+
+def every_output():
+    """Rule -> every file that it makes, for all rules so far. Synthetic surveys are no targets: what
+    is made from them is complete without them."""
+    return {
+        name: [file for output in rule.output.keys() for file in _files(rule, output, {})]
+        for name, rule in rules._rules.items()
+        if "synthetic" not in rule.rule.wildcard_names
+    }
+
+
+def every_record():
+    """The provenance record of every job of the rules so far."""
+    return [
+        file
+        for rule in rules._rules.values()
+        if "provenance" in rule.output.keys() and "synthetic" not in rule.rule.wildcard_names
+        for file in _files(rule, "provenance", {})
+    ]
+
+
+def _files(rule, output, values):
+    patterns, declared = (getattr(of.output, output) for of in (rule, rule.rule))
+    single = isinstance(patterns, str)
+    files = expand(list([patterns] if single else patterns), **{**_wildcards(rule), **values})
+    # The outputs that ``rules`` hands on have lost this flag.
+    return [local(file) for file in files] if single and is_flagged(declared, "local") else files
+
+
+def _wildcards(rule):
+    """Wildcard -> its values in the outputs of a rule."""
+    limits = rule.rule.wildcard_constraints
+    return {
+        name: [value for value in values if re.fullmatch(limits.get(name, ".*"), str(value))]
+        for name, values in VALUES.items()
+        if name in rule.rule.wildcard_names
+    }
+
+
+def every_picture(output):
+    """The pictures of all rules so far that draw, or their captions."""
+    drawing = [name for name, rule in rules._rules.items() if output in rule.output.keys()]
+    return [file for name in drawing for file in every(name, output)]
+
+
+def table_names():
+    """Stems of the tables of a run, apart from the comparison with the thesis."""
+    return [*TABLES, *(f"study-{study}" for study in VALUES["study"]), *EXPERIMENTS]
+
+
+def each_seed_of(model):
+    """What the best seed of a model is chosen by, and the models themselves."""
+    return [
+        file
+        for seed in settings.seeds
+        for file in (
+            f"{R}/evaluate/{model}/seed-{seed}.json",
+            f"{R}/tune/{model}/seed-{seed}.json",
+            tuned_file(model, seed),
+        )
+    ]
+
+
+def results_of(models=None, surveys=TRAIN, predicted=(), studies=(), experiments=(), predicts=None):
+    """The arguments of ``scenenet.results.Results`` besides its folder. Models are pairs, because their
+    order counts and that of a dict does not survive in a parameter."""
+    chosen = settings.models if models is None else models
+    return {
+        "models": [[model.name, model.kind] for model in chosen],
+        "seeds": list(settings.seeds) if chosen else [],
+        "surveys": list(surveys),
+        "predicted": list(predicted),
+        "studies": [study_settings(study) for study in studies],
+        "contests": list(experiments),
+        "predicts": predicts,
+    }
+
+
+def all_results():
+    return results_of(
+        predicted=NEW,
+        studies=VALUES["study"],
+        experiments=EXPERIMENTS,
+        predicts=settings.predict.model,
+    )
+
+
+@cache
+def dataset_figures():
+    """The figures of the data set and of the models, which one job draws."""
+    told = results_of()
+    return plan(Results(**{**told, "folder": R, "models": dict(told["models"]), "studies": ()}))
+
+
+def model_figures():
+    return [drawing.name for drawing in dataset_figures() if drawing.models]
+
+
+def pictures(names):
+    """The two files of each picture."""
+    return {
+        "pictures": [f"{R}/figures/{name}.png" for name in names],
+        "captions": [f"{R}/figures/{name}.json" for name in names],
+    }
+
+
+def database():
+    """The SQLite file of the MLflow store, if it is one, as an output: deleting it makes the store,
+    its record and all runs again. It is updated and not replaced, because it may hold the runs of other
+    data and of other people; nothing depends on its date, so their runs do not rerun anything."""
+    uri = settings.tracking.uri
+    file = uri.removeprefix("sqlite:///")
+    return {} if file == uri else {"database": update(local(file))}
+
+
+def protocol():
+    """Grid and split, as MLflow shows them."""
+    return (
+        f"{GRID}, split {settings.split.train:.0%} / {settings.split.validation:.0%} / "
+        f"{settings.split.test:.0%} by stretch of line"
+    )

@@ -10,6 +10,7 @@ from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
 from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.scoring import score_answers
+from scenenet.models.settings import BOOSTED_TREES
 
 
 def evaluate_boosted_trees(
@@ -47,7 +48,7 @@ def evaluate_boosted_trees(
         model = boosted_trees.tune(grown, parts["validation"].samples)
         tau = model.threshold()
         scores = score_answers(
-            "black box", seed, tau, model.probabilities, parts["test"], detection
+            BOOSTED_TREES, seed, tau, model.probabilities, parts["test"], detection
         )
         write_json(out, {"part": "test", "parameters": model.n_parameters()} | scores)
         if not took:

@@ -105,10 +105,18 @@ class Config(Settings):
         (), description="many small trainings that differ in one thing; config/studies.yaml"
     )
     cross_validation: CrossValidationSettings = CrossValidationSettings()
-    noise: NoiseSettings = NoiseSettings()
+    label_noise: NoiseSettings = NoiseSettings()
     detection: DetectionSettings = DetectionSettings()
     predict: Prediction = Prediction()
     tracking: TrackingSettings = TrackingSettings()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _renamed(cls, raw: Any) -> Any:
+        """Refuse settings of earlier versions by their new name."""
+        if isinstance(raw, Mapping) and "noise" in raw:
+            raise ValueError("noise: this setting is now called label_noise; rename the key")
+        return raw
 
     @model_validator(mode="before")
     @classmethod
@@ -147,23 +155,26 @@ class Config(Settings):
             if study.model not in known:
                 raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
             study.plans(self.model_named(study.model), self.voxels, self.split)
-        self.noise_models()
+        self.label_noise_models()
         self.crossed_models()
         return self
 
-    def noise_models(self) -> list[ModelSettings]:
-        """The models that are trained on wrong labels."""
-        return contenders(self.noise.contenders, self.models, "noise.contenders")
+    def label_noise_models(self) -> list[ModelSettings]:
+        """The models that are trained with label noise."""
+        return contenders(self.label_noise.contenders, self.models, "label_noise.contenders")
 
     def crossed_models(self) -> list[ModelSettings]:
         """The models that are cross-validated."""
         told = self.cross_validation.contenders
         return contenders(told, self.models, "cross_validation.contenders")
 
-    def contests(self) -> list[str]:
-        """Names of the contests that are held (``scenenet.experiments``)."""
-        held = {"cross_validation": self.cross_validation.leave_out, "noise": self.noise.levels}
-        return [name for name, wanted in held.items() if wanted]
+    def experiments(self) -> list[str]:
+        """Names of the experiments that are switched on (``scenenet.experiments``)."""
+        switches = {
+            "cross_validation": self.cross_validation.leave_out,
+            "label_noise": self.label_noise.levels,
+        }
+        return [name for name, switch in switches.items() if switch]
 
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)

@@ -204,8 +204,8 @@ def _executed(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:
-    """The statements, handlers and cases right below ``node``. Expressions hold none, and looking into
-    them would take most of the time."""
+    """The statements, handlers and cases directly below ``node``. Expressions contain none, and
+    visiting them would take most of the time."""
     for part in ("body", "handlers", "orelse", "finalbody", "cases"):
         children = getattr(node, part, None)
         if isinstance(children, list):

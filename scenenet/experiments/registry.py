@@ -14,5 +14,5 @@ if TYPE_CHECKING:
 
 EXPERIMENT_TABLES: Mapping[str, Callable[[pd.DataFrame], pd.DataFrame]] = {
     "cross_validation": summarise_folds,
-    "noise": summarise_noise,
+    "label_noise": summarise_noise,
 }

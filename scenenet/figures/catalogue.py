@@ -128,9 +128,9 @@ def plan(
     for study in results.studies:
         draw = _bind(model_figures.draw_study, results, study, thesis)
         planned.append(Drawing(f"study-{study.name}", study.title, "studies", draw))
-    for contest in results.contests:
-        title, draw_contest = EXPERIMENT_DRAWINGS[contest]
-        planned.append(Drawing(contest, title, contest, _bind(draw_contest, results)))
+    for experiment in results.experiments:
+        title, draw_experiment = EXPERIMENT_DRAWINGS[experiment]
+        planned.append(Drawing(experiment, title, experiment, _bind(draw_experiment, results)))
     return planned
 
 

@@ -11,7 +11,7 @@ from scenenet.results.folder import Results
 
 
 def draw_noise(results: Results, out: Path) -> tuple[str, str]:
-    summary = summarise_noise(results.contest_runs("noise"))
+    summary = summarise_noise(results.experiment_runs("label_noise"))
     alt = noise(summary, out)
     return alt, (
         "Trained and tuned on labels that are wrong by a known share, scored on towers further "
@@ -22,7 +22,7 @@ def draw_noise(results: Results, out: Path) -> tuple[str, str]:
 
 
 def draw_cross_validation(results: Results, out: Path) -> tuple[str, str]:
-    runs = results.contest_runs("cross_validation")
+    runs = results.experiment_runs("cross_validation")
     alt = cross_validation(runs, out)
     row = summarise_folds(runs).iloc[0]
     return alt, (
@@ -34,6 +34,6 @@ def draw_cross_validation(results: Results, out: Path) -> tuple[str, str]:
 
 EXPERIMENT_DRAWINGS = {
     "cross_validation": ("Every crop a test crop once", draw_cross_validation),
-    "noise": ("Trained on wrong labels", draw_noise),
+    "label_noise": ("Trained on wrong labels", draw_noise),
 }
-"""Title and drawing of each contest."""
+"""Title and drawing of each experiment."""

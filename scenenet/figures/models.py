@@ -136,7 +136,7 @@ def draw_study(
 
     runs = results.study_runs(study.name)
     if runs is None:
-        raise InputError("has not been run", file=results.folder / "studies" / study.name)
+        raise InputError("has not been run", file=results.folder / "study" / study.name)
     summary = summarise(study, runs, thesis or Thesis(source="", numbers={}))
     if study.is_grid:
         names, values = zip(*study.vary.items(), strict=True)

@@ -15,7 +15,7 @@ from scenenet.dataset.voxels import Measurement
 
 Positive = Annotated[int, Field(ge=1)]
 KernelSize = tuple[Positive, Positive, Positive]
-BOOSTED_TREES = "black box"
+BOOSTED_TREES = "boosted trees"
 """What tables call the boosted trees of ``scenenet.baselines.boosted_trees``."""
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
 

@@ -84,7 +84,7 @@ class Results:
         surveys: surveys that make the data set.
         predicted: surveys that were classified.
         studies: what was studied beside.
-        contests: which of ``scenenet.experiments`` were held.
+        experiments: which of ``scenenet.experiments`` were run.
         predicts: the model that classifies surveys; the first SCENE-Net where none is named.
     """
 
@@ -94,7 +94,7 @@ class Results:
     surveys: Sequence[str] = ()
     predicted: Sequence[str] = ()
     studies: Sequence[StudySettings] = ()
-    contests: Sequence[str] = ()
+    experiments: Sequence[str] = ()
     predicts: str | None = None
 
     def __post_init__(self) -> None:
@@ -152,24 +152,24 @@ class Results:
 
     def scene(self, rank: str) -> Mapping[str, Any] | None:
         """The best, median or worst test crop as voxels; None if it was not made."""
-        return self._if_there("scenes", f"{rank}.json")
+        return self._if_there("interactive_crop", f"{rank}.json")
 
     def certificate(self, model: str) -> Mapping[str, Any] | None:
         """Which promises of a GENEO a model keeps; None if it was not asked."""
-        return self._if_there("certificates", f"{model}.json")
+        return self._if_there("certificate", f"{model}.json")
 
     def timing(self, model: str) -> Mapping[str, Any] | None:
         """How long a model takes for a crop; None if it was not timed."""
-        return self._if_there("times", f"{model}.json")
+        return self._if_there("inference_time", f"{model}.json")
 
-    def black_box_times(self) -> Mapping[str, Any] | None:
-        """How long the black box takes to train and to answer a crop."""
-        return self._if_there("black_box", "times.json")
+    def boosted_trees_times(self) -> Mapping[str, Any] | None:
+        """Time of the boosted trees to train and to predict a crop; None if not measured."""
+        return self._if_there("boosted_trees", "times.json")
 
     @cached_property
-    def black_box(self) -> list[SeedResult]:
-        """The black box from every seed it was trained with."""
-        paths = [self.folder / "black_box" / f"seed-{seed}.json" for seed in self.seeds]
+    def boosted_trees(self) -> list[SeedResult]:
+        """The boosted trees, trained from each seed."""
+        paths = [self.folder / "boosted_trees" / f"seed-{seed}.json" for seed in self.seeds]
         found = [(seed, p) for seed, p in zip(self.seeds, paths, strict=True) if p.exists()]
         return [
             SeedResult(BOOSTED_TREES, BOOSTED_TREES, seed, read_result(path))
@@ -178,16 +178,16 @@ class Results:
 
     def study_runs(self, study: str) -> pd.DataFrame | None:
         """A row per variant and seed of a study; None if it was not run."""
-        path = self.folder / "studies" / study / "runs.csv"
+        path = self.folder / "study" / study / "runs.csv"
         return read_table(path) if path.exists() else None
 
-    def contest_runs(self, contest: str) -> pd.DataFrame:
-        """A row per model and seed, and what else a contest varies.
+    def experiment_runs(self, experiment: str) -> pd.DataFrame:
+        """A row per model and seed, and per value of what else the experiment varies.
 
         Raises:
-            InputError: it has not been held.
+            InputError: the experiment was not run.
         """
-        return read_table(self.folder / contest / "runs.csv")
+        return read_table(self.folder / experiment / "runs.csv")
 
     def champion_file(self, model: str) -> Path | None:
         """The model that predicts (``models/MODEL.json``, or only ``.safetensors``)."""
@@ -210,7 +210,7 @@ class Results:
     def grid_times(self) -> pd.DataFrame | None:
         """Time and size of every crop on the grids of the thesis
         (``scenenet.evaluation.voxelisation_time``)."""
-        path = self.folder / "times" / "grids.csv"
+        path = self.folder / "voxelisation_time" / "times.csv"
         return read_table(path) if path.exists() else None
 
     def split(self) -> pd.DataFrame | None:

@@ -54,9 +54,9 @@ def times(results: Results, thesis: Thesis) -> pd.DataFrame:
         row["thesis_useful_seconds"] = _scaled(thesis.value(f"times.{kind}.training_useful"), 3600)
         row["thesis_inference_ms"] = thesis.value(f"times.{kind}.inference")
         rows.append(row)
-    trees = results.black_box_times()
+    trees = results.boosted_trees_times()
     if trees is not None:
-        live = [r.alive for r in results.black_box]
+        live = [r.alive for r in results.boosted_trees]
         row = _training(trees["training_seconds"], sum(live) / max(1, len(live)))
         row |= {"model": BOOSTED_TREES, "peak_memory_mb": trees.get("peak_memory_mb")}
         rows.append(row | _inference(trees))

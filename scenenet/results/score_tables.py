@@ -81,8 +81,8 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
             row |= _mean_and_std(group, "voxel", SCORES)
             row |= _published_scores(thesis, kind)
             rows.append(row)
-    if results.black_box:
-        group = results.black_box
+    if results.boosted_trees:
+        group = results.boosted_trees
         row = {
             "model": BOOSTED_TREES,
             "counted": "all seeds",
@@ -111,7 +111,7 @@ def whole_towers(results: Results, thesis: Thesis | None = None) -> pd.DataFrame
     columns += [f"{part}_{n}{end}" for part in parts for n in names for end in ("", "_std")]
     groups = {model: results.of_model(model) for model in results.models}
     rows = []
-    for model, group in (groups | {BOOSTED_TREES: results.black_box}).items():
+    for model, group in (groups | {BOOSTED_TREES: results.boosted_trees}).items():
         if not group:
             continue
         row: dict[str, object] = {"model": model, "n_seeds": len(group)}

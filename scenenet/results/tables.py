@@ -43,14 +43,15 @@ def write_tables(
     results: Results, thesis: Thesis, out: str | Path, names: Iterable[str] = tuple(TABLES)
 ) -> list[Path]:
     """Write the tables called ``names`` as ``out/NAME.csv``, those of the studies as
-    ``out/study-NAME.csv`` and those of the contests by their names."""
+    ``out/study-NAME.csv`` and those of the experiments by their names."""
     made = {name: TABLES[name](results, thesis) for name in names}
     for study in results.studies:
         runs = results.study_runs(study.name)
         if runs is not None:
             made[f"study-{study.name}"] = summarise(study, runs, thesis)
-    for contest in results.contests:
-        made[contest] = EXPERIMENT_TABLES[contest](results.contest_runs(contest))
+    for experiment in results.experiments:
+        runs = results.experiment_runs(experiment)
+        made[experiment] = EXPERIMENT_TABLES[experiment](runs)
     paths = []
     for name, table in made.items():
         path = Path(out) / f"{name}.csv"
@@ -58,3 +59,22 @@ def write_tables(
             table.to_csv(partial, index=False, float_format="%.6g")
         paths.append(path)
     return paths
+
+
+def print_scores(folder: str | Path, dataset: str, grid: str) -> None:
+    """Print the scores of every model, if the tables of the run have been written.
+
+    Args:
+        folder: the result folder.
+        dataset, grid: what the scores are of, for the heading.
+    """
+    import pandas as pd
+
+    file = Path(folder) / "tables" / "models.csv"
+    if not file.exists():
+        return
+    columns = ["model", "counted", "precision", "recall", "f05", "iou_tower", "miou"]
+    scores = pd.read_csv(file)[columns]
+    print(f"\nScores on the test crops of {dataset}, {grid}, tower voxels:")
+    print(scores.to_string(index=False, float_format="%.3f", na_rep="-"))
+    print(f"Report: {folder}/report/index.html")

@@ -1,5 +1,5 @@
-"""A contest as an MLflow experiment of its own: a parent for each model and case, a run for each
-seed, with the same names of metrics."""
+"""An experiment as an MLflow experiment of its own: a parent for each model and case, and a run for
+each seed, with the same names of metrics."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ NOT_METRICS = ("seed", "model", "level", "fold", "crops")
 
 @dataclass(frozen=True)
 class Origin:
-    """What all runs of a contest share.
+    """What all runs of an experiment share.
 
     Attributes:
         dataset: name of the data, part of every key, so that runs of other data stand beside.
         tags: what they were made from and by.
-        pictures: figures of the whole contest, attached to every parent.
+        pictures: figures of the whole experiment, attached to every parent.
     """
 
     dataset: str
@@ -64,9 +64,8 @@ def noise_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
             "labels, truth_ against the truth."
         )
         case = {"level": float(level), "model": str(model)}
-        groups.append(
-            group_of("noise", origin, f"{model}, {level:.0%} wrong", case, rows, told, "5.2.5")
-        )
+        name = f"{model}, {level:.0%} wrong"
+        groups.append(group_of("label_noise", origin, name, case, rows, told, "5.2.5"))
     return groups
 
 
@@ -97,7 +96,7 @@ def fold_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
 
 
 def group_of(
-    contest: str,
+    experiment: str,
     origin: Origin,
     name: str,
     case: Mapping[str, Any],
@@ -109,14 +108,14 @@ def group_of(
     """A parent with the means of its rows, and a run for each of them.
 
     Args:
-        name: of the parent, unique in the contest.
+        name: of the parent, unique in the experiment.
         case: what the rows have in common; parameters of all runs.
         told: description of the parent.
         place: where the thesis asks for it.
         child: what tells a row from the others.
     """
-    key = f"{contest}/{origin.dataset}/{name}"
-    tags = {"study": contest, "dataset": origin.dataset, "place": place, **origin.tags}
+    key = f"{experiment}/{origin.dataset}/{name}"
+    tags = {"study": experiment, "dataset": origin.dataset, "place": place, **origin.tags}
     tags["model"] = str(case["model"])
     numbers = [c for c in rows.columns if c not in NOT_METRICS]
     children = []
@@ -163,15 +162,15 @@ def _means(children: Sequence[RunRecord]) -> dict[str, float | None]:
     return means
 
 
-CONTEST_NOTES = {
+EXPERIMENT_NOTES = {
     "cross_validation": "Every crop a test crop once, over all models and seeds.",
-    "noise": "Trained on labels of which a known share is wrong, scored against such labels and "
-    "against the truth. Thesis 5.2.5.",
+    "label_noise": "Trained on labels of which a known share is wrong, scored against such labels "
+    "and against the truth. Thesis 5.2.5.",
 }
-"""What the experiment of each contest says of itself."""
+"""The description of each experiment."""
 
-CONTEST_GROUPS: Mapping[str, Callable[[pd.DataFrame, Origin], list[RunGroup]]] = {
+EXPERIMENT_GROUPS: Mapping[str, Callable[[pd.DataFrame, Origin], list[RunGroup]]] = {
     "cross_validation": fold_groups,
-    "noise": noise_groups,
+    "label_noise": noise_groups,
 }
-"""The runs of each contest, by its name."""
+"""The runs of each experiment, by its name."""

@@ -41,7 +41,7 @@ def model_groups(
     base = {"study": study, "dataset": dataset, "protocol": protocol}
     groups = []
     trainings = {model: results.of_model(model) for model in results.models}
-    for model, trained in (trainings | {BOOSTED_TREES: results.black_box}).items():
+    for model, trained in (trainings | {BOOSTED_TREES: results.boosted_trees}).items():
         if not trained:
             continue
         own = (settings or {}).get(model, {})

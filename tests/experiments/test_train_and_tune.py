@@ -69,7 +69,7 @@ def test_without_validation_tau_is_of_the_training_crops(crops):
     assert thesis.tau == thesis.curve(crops[:3]).best()[0]
 
 
-def test_the_black_box_is_never_tuned_on_what_its_trees_know(crops):
+def test_the_boosted_trees_is_never_tuned_on_what_its_trees_know(crops):
     settings = BoostedTreesSettings()
     tuned, curve = boosted_trees.fit_and_tune(crops[:3], settings, 2)
     rival = train_and_tune(None, crops[:3], [], 2)

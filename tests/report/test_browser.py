@@ -56,7 +56,9 @@ CONTRASTS = """() => {
 @pytest.fixture
 def scene(page: Path, results: Results, thesis: Thesis) -> dict:
     """What the turning crop of the page is made from."""
-    made = write_scene(results, "scenenet", "best", results.folder / "scenes" / "best.json")
+    made = write_scene(
+        results, "scenenet", "best", results.folder / "interactive_crop" / "best.json"
+    )
     write_report(results, thesis, page)
     return made
 

@@ -1,4 +1,4 @@
-"""A contest in tables, figure, MLflow and page."""
+"""An experiment in tables, figure, MLflow and page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def noise_runs() -> pd.DataFrame:
     rows = []
     for level in (0.0, 0.4, 0.6):
         for seed in (0, 1):
-            for model, f05 in ((LABELS, 1 - level), ("scenenet", 0.5), ("black box", 0.4)):
+            for model, f05 in ((LABELS, 1 - level), ("scenenet", 0.5), ("boosted trees", 0.4)):
                 row = dict.fromkeys(COLUMNS, 0.25) | {"level": level, "share": level}
                 row |= {"seed": seed, "model": model, "alive": True, "truth_f05": f05 + seed / 100}
                 row["training_seconds"] = None if model == LABELS else 2.0
@@ -31,16 +31,16 @@ def noise_runs() -> pd.DataFrame:
 
 @pytest.fixture
 def noisy(results):
-    (results.folder / "noise").mkdir()
-    noise_runs().to_csv(results.folder / "noise" / "runs.csv", index=False)
-    return replace(results, contests=("noise",))
+    (results.folder / "label_noise").mkdir()
+    noise_runs().to_csv(results.folder / "label_noise" / "runs.csv", index=False)
+    return replace(results, experiments=("label_noise",))
 
 
 def test_table_figure_and_section(noisy, thesis):
     write_tables(noisy, thesis, noisy.folder / "tables", names=())
     table = pd.read_csv(noisy.folder / "tables" / "noise.csv")
-    assert list(table["model"][:3]) == [LABELS, "scenenet", "black box"]
-    (drawing,) = [d for d in plan(noisy) if d.section == "noise"]
+    assert list(table["model"][:3]) == [LABELS, "scenenet", "boosted trees"]
+    (drawing,) = [d for d in plan(noisy) if d.section == "label_noise"]
     (picture,) = draw_all([drawing], noisy.folder / "figures")
     assert picture.file.stat().st_size > 5000
     assert "scenenet 0.25 and 0.51" in picture.alt
@@ -51,9 +51,9 @@ def test_table_figure_and_section(noisy, thesis):
     assert kinds == ["text", "facts", "figure", "notes", "table"]
 
 
-def test_no_contest_no_section(results, thesis):
+def test_no_experiment_no_section(results, thesis):
     assert experiment_sections.noise(Material(results, thesis)) is None
-    assert all(drawing.section != "noise" for drawing in plan(results))
+    assert all(drawing.section != "label_noise" for drawing in plan(results))
 
 
 def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
@@ -75,7 +75,7 @@ def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
 
 def crossed_runs() -> pd.DataFrame:
     rows = []
-    for model, base in (("scenenet", 0.7), ("cnn", 0.3), ("black box", 0.8)):
+    for model, base in (("scenenet", 0.7), ("cnn", 0.3), ("boosted trees", 0.8)):
         for seed in (0, 1):
             for fold, crops in ((1, "a b"), (2, "c d")):
                 row = dict.fromkeys(cross_validation.COLUMNS, 0.5)
@@ -88,7 +88,7 @@ def crossed_runs() -> pd.DataFrame:
 def test_cross_validation_is_the_main_result_where_it_is_there(results, thesis):
     (results.folder / "cross_validation").mkdir()
     crossed_runs().to_csv(results.folder / "cross_validation" / "runs.csv", index=False)
-    crossed = replace(results, contests=("cross_validation",))
+    crossed = replace(results, experiments=("cross_validation",))
     write_tables(crossed, thesis, crossed.folder / "tables", names=())
     (drawing,) = [d for d in plan(crossed) if d.section == "cross_validation"]
     (picture,) = draw_all([drawing], crossed.folder / "figures")
@@ -107,7 +107,7 @@ def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():
     job = {"config": "c", "code": "d", "version": "1", "inputs": {"voxels": "x"}}
     origin = origin_of("ts40k", {"inputs": {"runs": "y"}}, job)
     (group, *_) = groups = fold_groups(crossed_runs(), origin)
-    assert [g.parent.name for g in groups] == ["scenenet", "cnn", "black box"]
+    assert [g.parent.name for g in groups] == ["scenenet", "cnn", "boosted trees"]
     assert [child.key for child in group.children] == [
         f"cross_validation/ts40k/scenenet/seed-{seed}/fold-{fold}"
         for seed in (0, 1)

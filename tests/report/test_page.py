@@ -135,7 +135,7 @@ def test_a_study_is_asked_shown_and_told(page: Path, results: Results, thesis: T
     rows = [dict.fromkeys(COLUMNS, 0.5) | {"variant": v, "seed": s, "precision": 0.3 + s / 10}
             | {"lowest_weight": -0.125 if v == "A" else 0.25}
             for v in "EA" for s in (0, 1)]  # fmt: skip
-    folder = results.folder / "studies" / "ablations"
+    folder = results.folder / "study" / "ablations"
     folder.mkdir(parents=True)
     pd.DataFrame(rows).to_csv(folder / "runs.csv", index=False)
     studied = replace(results, studies=[study])

@@ -61,7 +61,7 @@ def test_time_that_is_saved_is_better_the_more_it_is(
 ):
     for model, ms in (("scenenet", scenenet), ("cnn", 43.0)):
         times = {"inference_ms": {"64": ms}}
-        (results.folder / "times" / f"{model}.json").write_text(json.dumps(times))
+        (results.folder / "inference_time" / f"{model}.json").write_text(json.dumps(times))
     found = row(compare(results, thesis), "times.lift.inference")
     assert found["ours"] == pytest.approx(scenenet - 43)
     assert found["verdict"] == verdict
@@ -74,7 +74,7 @@ def test_studies_stand_beside_the_tables_they_repeat(results: Results, thesis: T
     )  # fmt: skip
     runs = [dict.fromkeys(COLUMNS, 0.5) | {"variant": v, "seed": 0, "recall": r}
             for v, r in (("A", 0.0), ("E", 0.3))]  # fmt: skip
-    folder = results.folder / "studies" / "ablations"
+    folder = results.folder / "study" / "ablations"
     folder.mkdir(parents=True)
     pd.DataFrame(runs).to_csv(folder / "runs.csv", index=False)
     frame = compare(replace(results, studies=[study]), thesis)
@@ -113,7 +113,7 @@ def test_what_studies_say_by_themselves_stands_beside_the_thesis(results: Result
             for v in study.all_variants()
             for s in study.seeds
         ]
-        folder = results.folder / "studies" / name
+        folder = results.folder / "study" / name
         folder.mkdir(parents=True)
         pd.DataFrame(rows).to_csv(folder / "runs.csv", index=False)
     frame = compare(replace(results, studies=list(told.values())), thesis)

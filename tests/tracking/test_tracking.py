@@ -161,9 +161,9 @@ def test_a_parent_has_the_summary_of_the_runs_under_it(settings, client, results
         assert child.data.tags["mlflow.parentRunId"] == parent.info.run_id
 
 
-def test_the_black_box_stands_beside_the_models(settings, client, results, tmp_path):
+def test_the_boosted_trees_stands_beside_the_models(settings, client, results, tmp_path):
     told = json.loads((results.folder / "evaluate" / "scenenet" / "seed-1.json").read_text())
-    box = results.folder / "black_box" / "seed-1.json"
+    box = results.folder / "boosted_trees" / "seed-1.json"
     box.parent.mkdir()
     box.write_text(json.dumps(told | {"model": BOOSTED_TREES}))
     log(settings, results, tmp_path)
@@ -332,7 +332,7 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(
     table = pd.DataFrame(rows)
     own = experiment_of(settings, study.name)
     create_store(settings, tmp_path / "store.json", [own.experiment])
-    runs_file = results.folder / "studies" / study.name / "runs.csv"
+    runs_file = results.folder / "study" / study.name / "runs.csv"
     runs_file.parent.mkdir(parents=True)
     table.to_csv(runs_file, index=False)
     drawn = [d for d in plan(replace(results, studies=[study])) if d.section == "studies"]

@@ -94,6 +94,6 @@ def test_every_caption_is_of_something(project_root: Path):
     for caption in (project_root / "workflow/report").glob("*.rst"):
         kind = caption.stem.removeprefix("figure-").removeprefix("table-")
         named = kind in rules or caption.stem == "workflow"
-        drawn = f'"{kind}' in (project_root / "scenenet/figures/plan.py").read_text()
-        tabled = f'"{kind}"' in (project_root / "scenenet/tables.py").read_text()
+        drawn = f'"{kind}' in (project_root / "scenenet/figures/catalogue.py").read_text()
+        tabled = f'"{kind}"' in (project_root / "scenenet/results/tables.py").read_text()
         assert named or drawn or tabled, caption.name

@@ -210,7 +210,7 @@ def test_touching_every_script_and_module_runs_nothing(project):
 
 
 def test_editing_a_docstring_or_a_comment_runs_nothing(project):
-    file = project.folder / "scenenet/training.py"
+    file = project.folder / "scenenet/training/train.py"
     text = file.read_text()
     assert text.startswith('"""The training loop')
     file.write_text(text.replace('"""The training loop', '"""The loop', 1) + "# the end\n")
@@ -218,7 +218,7 @@ def test_editing_a_docstring_or_a_comment_runs_nothing(project):
 
 
 def test_editing_the_training_loop_trains_again_and_prepares_nothing(project):
-    with (project.folder / "scenenet/training.py").open("a") as stream:
+    with (project.folder / "scenenet/training/train.py").open("a") as stream:
         stream.write("NOTHING = 0\n")
     # One script draws all figures, and some crops are answered for them.
     assert project.planned() == {**LEARNED, **NOISE, "tower_map": 2, "survey_map": 2}
@@ -232,19 +232,19 @@ def test_a_new_kernel_trains_again(project):
 
 
 def test_editing_the_report_writes_the_report_again(project):
-    with (project.folder / "scenenet/report/style.css").open("a") as stream:
+    with (project.folder / "scenenet/report/assets/style.css").open("a") as stream:
         stream.write("p { color: black }\n")
     assert project.planned() == {"report": 1}
 
 
 def test_editing_the_check_reads_no_survey_for_the_dataset(project):
-    with (project.folder / "scenenet/pointcloud/check.py").open("a") as stream:
+    with (project.folder / "scenenet/pointcloud/quality/check.py").open("a") as stream:
         stream.write("NOTHING = 0\n")
     assert project.planned() == {"check": 3, "tables": 1, "report": 1}
 
 
 def test_editing_the_command_line_runs_nothing(project):
-    with (project.folder / "scenenet/cli.py").open("a") as stream:
+    with (project.folder / "scenenet/cli/app.py").open("a") as stream:
         stream.write("NOTHING = 0\n")
     assert project.planned() == {}
 
@@ -284,7 +284,7 @@ def test_a_deleted_prediction_is_made_again(project):
 
 def test_a_deleted_mlflow_store_is_made_again_with_all_its_runs(project):
     (project.folder / "mlflow.db").unlink()
-    logged = {"track": 1, "track_studies": 1, "track_contest": 1, "register": 1}
+    logged = {"track": 1, "track_studies": 1, "track_experiment": 1, "register": 1}
     assert project.planned() == {"mlflow_store": 1, **logged, "report": 1}
 
 

@@ -129,7 +129,7 @@ GRID = settings.voxels.label
 # Sorted, so that the order of the rows in the survey sheet does not matter.
 TRAIN = sorted(filter(trained_on, SURVEYS))
 NEW = sorted(set(SURVEYS) - set(TRAIN))
-EXPERIMENTS = settings.contests()
+EXPERIMENTS = settings.experiments()
 CROSS_VALIDATED = {
     **{model.name: model.model_dump(mode="json") for model in settings.crossed_models()},
     BOOSTED_TREES: None,
@@ -143,7 +143,7 @@ VALUES = {
     "study": [study.name for study in settings.studies],
     "experiment": EXPERIMENTS,
     "contender": [*CROSS_VALIDATED] if "cross_validation" in EXPERIMENTS else [],
-    "noise_seed": list(settings.noise.seeds) if "noise" in EXPERIMENTS else [],
+    "noise_seed": list(settings.label_noise.seeds) if "label_noise" in EXPERIMENTS else [],
     "rank": list(CROP_RANKS),
 }
 

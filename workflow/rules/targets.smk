@@ -88,7 +88,7 @@ def each_seed_of(model):
 
 
 def results_of(models=None, surveys=TRAIN, predicted=(), studies=(), experiments=(), predicts=None):
-    """The arguments of ``scenenet.results.Results`` besides its folder. Models are pairs, because their
+    """The arguments of ``scenenet.results.folder.Results`` besides its folder. Models are pairs, because their
     order counts and that of a dict does not survive in a parameter."""
     chosen = settings.models if models is None else models
     return {
@@ -97,7 +97,7 @@ def results_of(models=None, surveys=TRAIN, predicted=(), studies=(), experiments
         "surveys": list(surveys),
         "predicted": list(predicted),
         "studies": [study_settings(study) for study in studies],
-        "contests": list(experiments),
+        "experiments": list(experiments),
         "predicts": predicts,
     }
 

@@ -9,7 +9,7 @@ def track_experiment(job: _job.Job) -> None:
     from scenenet.figures import read_pictures
     from scenenet.results.folder import read_result, read_table
     from scenenet.tracking import TrackingSettings, log_runs
-    from scenenet.tracking.experiment_runs import CONTEST_GROUPS, CONTEST_NOTES, origin_of
+    from scenenet.tracking.experiment_runs import EXPERIMENT_GROUPS, EXPERIMENT_NOTES, origin_of
     from scenenet.tracking.study_runs import experiment_of
 
     experiment = job.identity["experiment"]
@@ -18,8 +18,8 @@ def track_experiment(job: _job.Job) -> None:
     records = [read_result(Path(path)) for path in (job.input.joined, job.input.record)]
     pictures = read_pictures(Path(job.input.pictures).parent, [experiment])
     origin = origin_of(job.identity["dataset"], *records, pictures)
-    groups = CONTEST_GROUPS[experiment](read_table(job.input.runs), origin)
-    log_runs(settings, groups, job.output.runs, job.input.store, CONTEST_NOTES[experiment])
+    groups = EXPERIMENT_GROUPS[experiment](read_table(job.input.runs), origin)
+    log_runs(settings, groups, job.output.runs, job.input.store, EXPERIMENT_NOTES[experiment])
 
 
 _job.run(track_experiment)

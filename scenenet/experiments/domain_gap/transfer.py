@@ -21,7 +21,7 @@ from scenenet.experiments.domain_gap.compare_crops import real_crops, synthetic_
 from scenenet.experiments.train_and_tune import TunedModel, train_boosted_trees, train_model
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.metrics.voxel_scores import Confusion
-from scenenet.models.settings import ModelSettings, TrainingSettings
+from scenenet.models.settings import BOOSTED_TREES, ModelSettings, TrainingSettings
 from scenenet.pointcloud import PointCloud
 from scenenet.synthetic import SyntheticSettings
 
@@ -65,7 +65,7 @@ def transfer(
     rows = []
     jobs = {
         "scenenet": lambda a, b: train_scenenet(a, b, seeds),
-        "black box": train_boosted_trees,
+        BOOSTED_TREES: train_boosted_trees,
     }
     for name, train in jobs.items():
         model = train(learnt, validation)

@@ -1,4 +1,4 @@
-"""What takes part in a contest, and what it is about."""
+"""Settings of the experiment with label noise."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def cross_validation(material: Material) -> Section | None:
 
 def noise(material: Material) -> Section | None:
     """Thesis 5.2.5."""
-    frame = material.table("noise")
+    frame = material.table("label_noise")
     if frame is None:
         return None
     worst = frame[frame["level"] == frame["level"].max()]
@@ -88,13 +88,13 @@ def noise(material: Material) -> Section | None:
     )
     shown = frame.assign(share_percent=100 * frame["share"])
     return Section(
-        "noise",
+        "label_noise",
         "Trained on wrong labels",
         [
             Text(text),
             Facts([("wrong tower points", f"{worst['share'].iloc[0]:.0%}"), *facts]),
-            *material.figures("noise"),
+            *material.figures("label_noise"),
             Notes("What each model makes of wrong labels", findings(frame)),
-            table(shown, columns, caption, "tables/noise.csv", folded=True),
+            table(shown, columns, caption, "tables/label_noise.csv", folded=True),
         ],
     )

@@ -64,9 +64,9 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     assert (row["tau"], row["f05"], row["tp"]) == (rival.tau, counts.f05, counts.tp)
 
 
-def test_the_black_box_takes_part(manifest):
+def test_the_boosted_trees_takes_part(manifest):
     (row, *_) = run_folds(load([manifest]), None, (0,), 3, 0.0, DETECTION)
-    assert row["model"] == "black box"
+    assert row["model"] == "boosted trees"
     assert row["training_crops"] == 3
     assert 0 < row["tau"] < 1
 

@@ -34,7 +34,7 @@ def held(models, tmp_path_factory):
 def test_every_model_at_every_level_and_the_labels_beside(held):
     table, out = held
     assert tuple(table.columns) == COLUMNS == tuple(pd.read_csv(out).columns)
-    names = [LABELS, "operational", "scenenet", "cnn", "black box"]
+    names = [LABELS, "operational", "scenenet", "cnn", "boosted trees"]
     assert list(table["model"]) == 2 * names
     assert list(table["level"]) == 5 * [0] + 5 * [0.5]
     trained = table[table["model"] != LABELS]
@@ -78,7 +78,7 @@ def test_the_same_seed_gives_the_same_scores(held, models, tmp_path):
     table, _ = held
     again = run_noise(STUDY, models[:1], GRID, 0, tmp_path / "again.csv")
     scores = [name for name in COLUMNS if name != "training_seconds"]
-    same = table["model"].isin([LABELS, "operational", "black box"])
+    same = table["model"].isin([LABELS, "operational", "boosted trees"])
     first = table[same].reset_index(drop=True)
     pd.testing.assert_frame_equal(first[scores], again[scores], check_dtype=False)
     other = run_noise(STUDY, [], GRID, 1, tmp_path / "other.csv")
@@ -137,10 +137,10 @@ def test_contenders_are_models_of_the_configuration_with_changes(models):
         Contender(model="cnn", changes={"training.epochs": 9}, name="long"),
         Contender(model="cnn"),
     )
-    long, plain = contenders(told, models, "noise")
+    long, plain = contenders(told, models, "label_noise")
     assert (long.name, long.training.epochs) == ("long", 9)
     assert plain == models[2]
-    assert contenders((), models, "noise") == models
+    assert contenders((), models, "label_noise") == models
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ def test_contenders_are_models_of_the_configuration_with_changes(models):
 )
 def test_contenders_that_cannot_be_are_named(models: list[ModelSettings], told, named):
     with pytest.raises(ValueError, match=named):
-        contenders([Contender(**one) for one in told], models, "noise")
+        contenders([Contender(**one) for one in told], models, "label_noise")
 
 
 @pytest.mark.parametrize(

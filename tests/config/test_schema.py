@@ -133,6 +133,12 @@ def test_a_mistake_in_one_model_is_told_of_that_model():
     assert "one setting is wrong" in message
 
 
+def test_a_setting_of_an_earlier_version_is_refused_by_its_new_name():
+    message = complaint(noise={"levels": [0, 0.2]})
+    assert "noise: this setting is now called label_noise" in message
+    assert load(raw(label_noise={"levels": [0, 0.2]})).label_noise.levels == (0, 0.2)
+
+
 def test_mappings_are_merged_and_lists_replaced():
     base = {"a": {"b": 1, "c": [1, 2]}, "d": 1}
     assert merged(base, {"a": {"c": [3]}, "d": None}) == {"a": {"b": 1, "c": [3]}, "d": None}

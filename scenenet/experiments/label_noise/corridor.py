@@ -93,7 +93,7 @@ def _strengths(corridor: Corridor, levels: Sequence[float]) -> list[float]:
         raise InputError(
             f"no annotation of this line makes {max(levels):.0%} of its tower points wrong; the "
             f"strongest makes {shares[-1]:.0%}",
-            remedy="Set noise.levels lower",
+            remedy="Set label_noise.levels lower",
         )
     return [float(np.interp(level, shares, STRENGTHS)) if level else 0.0 for level in levels]
 

@@ -51,14 +51,14 @@ class NoiseSettings(Settings):
         try:
             towers = self.line_of(0).towers
         except ValidationError as error:
-            raise ValueError(f"noise.line: {_fault(error)}") from None
+            raise ValueError(f"label_noise.line: {_fault(error)}") from None
         if towers < self.training + self.validation + 3:
             raise ValueError(
-                f"noise: {towers} towers are too few for {self.training} to train on, "
+                f"label_noise: {towers} towers are too few for {self.training} to train on, "
                 f"{self.validation} to tune on, two left out and one to test on"
             )
         if len(set(self.levels)) < len(self.levels):
-            raise ValueError("noise.levels: a level is there more than once")
+            raise ValueError("label_noise.levels: a level is there more than once")
         return self
 
     def line_of(self, seed: int) -> SyntheticSettings:

@@ -38,7 +38,7 @@ def noisy(results):
 
 def test_table_figure_and_section(noisy, thesis):
     write_tables(noisy, thesis, noisy.folder / "tables", names=())
-    table = pd.read_csv(noisy.folder / "tables" / "noise.csv")
+    table = pd.read_csv(noisy.folder / "tables" / "label_noise.csv")
     assert list(table["model"][:3]) == [LABELS, "scenenet", "boosted trees"]
     (drawing,) = [d for d in plan(noisy) if d.section == "label_noise"]
     (picture,) = draw_all([drawing], noisy.folder / "figures")
@@ -61,8 +61,8 @@ def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
     assert len(groups) == 9
     group = next(g for g in groups if g.parent.name == "scenenet, 60% wrong")
     assert [child.key for child in group.children] == [
-        "noise/tiny/scenenet, 60% wrong/seed-0",
-        "noise/tiny/scenenet, 60% wrong/seed-1",
+        "label_noise/tiny/scenenet, 60% wrong/seed-0",
+        "label_noise/tiny/scenenet, 60% wrong/seed-1",
     ]
     assert group.parent.metrics["truth_f05"] == pytest.approx(0.505)
     assert group.parent.metrics["truth_f05_std"] == pytest.approx(0.01 / 2**0.5)

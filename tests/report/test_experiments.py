@@ -96,7 +96,7 @@ def test_cross_validation_is_the_main_result_where_it_is_there(results, thesis):
     assert "its folds from 0.81 to 0.91" in picture.alt
     section = experiment_sections.cross_validation(Material(crossed, thesis))
     assert section is not None and section.title.startswith("Main result")
-    assert "black box 0.960, scenenet 0.860, cnn 0.460" in section.blocks[0].text
+    assert "boosted trees 0.960, scenenet 0.860, cnn 0.460" in section.blocks[0].text
     assert [block.kind for block in section.blocks] == ["text", "facts", "figure", "table"]
     assert experiment_sections.cross_validation(Material(results, thesis)) is not None
     (results.folder / "tables" / "cross_validation.csv").unlink()

@@ -167,8 +167,8 @@ def test_the_boosted_trees_stands_beside_the_models(settings, client, results, t
     box.parent.mkdir()
     box.write_text(json.dumps(told | {"model": BOOSTED_TREES}))
     log(settings, results, tmp_path)
-    (parent,) = runs(client)["black box (corridors)"]
-    (seed,) = runs(client)["black box seed 1"]
+    (parent,) = runs(client)["boosted trees (corridors)"]
+    (seed,) = runs(client)["boosted trees seed 1"]
     assert seed.data.tags["mlflow.parentRunId"] == parent.info.run_id
     assert seed.data.tags["kind"] == BOOSTED_TREES
     assert parent.data.metrics["test_precision_mean"] == pytest.approx(0.6)

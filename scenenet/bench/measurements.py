@@ -236,8 +236,8 @@ def survey() -> dict[str, Any]:
     """A survey from file to file, beside laspy alone reading and writing the same points."""
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.model_file import ModelCard, write_model
-    from scenenet.prediction.predict import predict_survey
     from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.writers import predict_to_files
     from scenenet.synthetic import SyntheticSettings, make_survey
 
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
@@ -254,7 +254,7 @@ def survey() -> dict[str, Any]:
 
         def ours() -> None:
             out = (folder / "out.laz", folder / "out.geojson", folder / "out.json")
-            predict_survey(source, folder / "model.json", *out, settings, DetectionSettings())
+            predict_to_files(source, folder / "model.json", *out, settings, DetectionSettings())
 
         def laspy_alone() -> None:
             peers.read_and_write(source, folder / "copy.laz", settings.chunk_points)

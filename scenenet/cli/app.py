@@ -204,8 +204,8 @@ def predict(
     as_json: AsJson = False,
 ) -> None:
     """Classify surveys: DIR/NAME.laz, NAME.towers.geojson and NAME.summary.json for each."""
-    from scenenet.prediction.predict import predict_survey
     from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.writers import predict_to_files
 
     names = [survey.stem for survey in surveys]
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -222,7 +222,7 @@ def predict(
                 "the result would overwrite the survey", file=survey, remedy="Name another --out"
             )
         summaries.append(
-            predict_survey(
+            predict_to_files(
                 survey,
                 model,
                 target,
@@ -230,7 +230,7 @@ def predict(
                 target.with_suffix(".summary.json"),
                 settings,
                 _detection(min_wire),
-            )
+            ).to_json()
         )
     _answer(
         summaries,

@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from scenenet.core.errors import InputError
-from scenenet.core.files import read_json
 from scenenet.dataset.crops import CropSettings, cut_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.split import SplitSettings, split_crops
@@ -194,11 +193,8 @@ def _survey_towers(
     survey: Path, towers: pd.DataFrame, model: str | Path, detection: DetectionSettings
 ) -> TowerMatch:
     """Towers found anywhere in a survey against its labelled ones."""
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
-        laz, geojson, summary = (Path(scratch) / f"p{end}" for end in (".laz", ".json", ".s.json"))
-        predict_survey(survey, model, laz, geojson, summary, PredictSettings(), detection)
-        features = read_json(geojson)["features"]
-    found = np.array([feature["geometry"]["coordinates"] for feature in features])
+    with predict_survey(survey, model, PredictSettings(), detection) as prediction:
+        found = np.array([[tower.x, tower.y] for tower in prediction.towers])
     return match_towers(found, towers[["x", "y"]].to_numpy(float))
 
 

@@ -93,7 +93,7 @@ def detect_towers(
     return sorted(towers, key=lambda t: (-t.probability, t.x, t.y))
 
 
-def whole_tower(
+def body_voxels(
     tower: DetectedTower, occupied: np.ndarray, settings: DetectionSettings
 ) -> np.ndarray:
     """Which occupied voxels (M, 3) m are of a tower's body, detected or not: (M,) bool.

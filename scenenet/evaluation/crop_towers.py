@@ -10,7 +10,7 @@ from scenenet.convolution.coarsening import block_edge, coarsened
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.dataset.crops import Crop
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample
-from scenenet.detection.detect import DetectedTower, among, detect_towers, whole_tower
+from scenenet.detection.detect import DetectedTower, among, body_voxels, detect_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 
@@ -47,7 +47,7 @@ def find_in_crop(
         seen = np.zeros(len(places), bool)
         seen[detected[tower.voxels]] = True
         theirs |= seen[block] & (answers >= tau)
-        theirs |= whole_tower(tower, centres, detection)
+        theirs |= body_voxels(tower, centres, detection)
     return found, theirs
 
 

@@ -1,35 +1,34 @@
-"""Why a tower was called one: who contributed what (thesis 5.2.3, Figure 5.6)."""
+"""Explanation of each detected tower: the share of each GENEO (thesis 5.2.3, Figure 5.6)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from scenenet.detection.conductors import FAR
+from scenenet.detection.survey_tower import SurveyTower
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import ModelCard
 
-SILENT = 0.01
-"""A GENEO with a smaller share said nothing that a person would want to read."""
+NEGLIGIBLE = 0.01
+"""A GENEO with a smaller absolute share is not worth a sentence."""
 
 
 @dataclass(frozen=True)
-class Receipt:
-    """The reason for one tower.
+class TowerExplanation:
+    """The reasons for one tower.
 
     Attributes:
         id: number in the tower list.
-        x, y: m, in the survey's CRS.
+        x, y: m, in the CRS of the survey.
         height: m above the ground at its foot.
-        probability: of its most certain voxel.
-        evidence: what was measured there that speaks for a tower, whatever the model says.
-        contributions: (GENEO, share, sentence), the largest first. Positive shares speak for a
-            tower, negative ones against; their absolute values sum to about one.
-        doubts: what should make a person look again.
+        probability: highest probability of its voxels.
+        evidence: measurements at the place that support a tower, whatever the model predicts.
+        contributions: (GENEO, share, sentence), the largest first. Positive shares support a
+            tower, negative ones oppose it; their absolute values sum to about one.
+        doubts: reasons for a person to check the tower.
     """
 
     id: int
@@ -42,63 +41,65 @@ class Receipt:
     doubts: tuple[str, ...]
 
 
-def receipts(geojson: Mapping[str, Any], model: VoxelModel, card: ModelCard) -> list[Receipt]:
-    """A receipt for every tower of a list that ``scenenet.prediction.predict`` has written.
+def explanations(towers: Iterable[SurveyTower], card: ModelCard) -> list[TowerExplanation]:
+    """An explanation of every tower of a survey.
 
-    A model without GENEOs gives receipts without contributions: it has no parts with a meaning.
+    The contributions are empty for a model without GENEOs.
     """
-    return [_receipt(feature, model, card) for feature in geojson["features"]]
+    return [_explanation(tower, card) for tower in towers]
 
 
-def _receipt(feature: Mapping[str, Any], model: VoxelModel, card: ModelCard) -> Receipt:
-    facts = feature["properties"]
-    shares = sorted(facts["contributions"].items(), key=lambda item: -abs(item[1]))
-    doubts = []
-    if facts["edge_distance"] < facts["height"]:
-        doubts.append(
-            f"{facts['edge_distance']:.0f} m from the edge of the data, nearer than it is tall: "
-            "it may be cut off"
-        )
-    if facts["wire_directions"] == 1 and facts["edge_distance"] >= FAR:
-        doubts.append("wires leave it in one direction only: the end of a line, or no tower")
-    if card.tau is not None and facts["probability"] < card.tau:
-        doubts.append(
-            f"its probability stays under tau, {card.tau:.3f}: its wires and its body speak for it"
-        )
-    elif card.tau is not None and facts["probability"] < (1 + card.tau) / 2:
-        doubts.append(f"its probability is not far above tau, {card.tau:.3f}")
-    x, y = feature["geometry"]["coordinates"][:2]
-    return Receipt(
-        facts["id"],
-        x,
-        y,
-        facts["height"],
-        facts["probability"],
-        _evidence(facts),
-        tuple((name, share, _sentence(name, share, model)) for name, share in shares),
-        tuple(doubts),
+def _explanation(tower: SurveyTower, card: ModelCard) -> TowerExplanation:
+    shares = sorted(tower.contributions.items(), key=lambda item: -abs(item[1]))
+    return TowerExplanation(
+        tower.id,
+        tower.x,
+        tower.y,
+        tower.height,
+        tower.probability,
+        _evidence(tower),
+        tuple((name, share, _sentence(share)) for name, share in shares),
+        _doubts(tower, card.tau),
     )
 
 
-def _evidence(facts: Mapping[str, Any]) -> tuple[str, ...]:
-    """What was measured of a tower, in words."""
-    bearings = sorted(facts["wire_bearings"])
-    wires = "no wires are seen to leave it"
+def _evidence(tower: SurveyTower) -> tuple[str, ...]:
+    """The measurements of a tower, in words."""
+    bearings = sorted(tower.conductor_bearings)
+    conductors = "no conductors are seen to leave it"
     if bearings:
         towards = " and ".join(f"{bearing:.0f}°" for bearing in bearings)
-        wires = f"wires leave its head towards {towards} from north"
+        conductors = f"conductors leave its head at bearings of {towards} from north"
     return (
-        f"it stands {facts['height']:.0f} m tall on the ground at {facts['base_elevation']:.0f} m",
-        f"its body is {facts['width']:.0f} m wide where nothing touches it",
-        wires,
+        f"it is {tower.height:.0f} m tall, on ground at {tower.base:.0f} m",
+        f"its body is {tower.width:.0f} m wide where nothing touches it",
+        conductors,
     )
 
 
-def _sentence(name: str, share: float, model: VoxelModel) -> str:
-    if abs(share) < SILENT:
-        return "had next to nothing to say here"
-    side = "speaks for a tower" if share > 0 else "speaks against one"
-    return f"{side}, {abs(share):.0%} of the answer"
+def _doubts(tower: SurveyTower, tau: float | None) -> tuple[str, ...]:
+    doubts = []
+    if tower.edge_distance < tower.height:
+        doubts.append(
+            f"it is {tower.edge_distance:.0f} m from the edge of the data, less than its height: "
+            "part of it may be missing"
+        )
+    if tower.conductor_directions == 1 and tower.edge_distance >= FAR:
+        doubts.append("conductors leave it in one direction only: the end of a line, or no tower")
+    if tau is not None and tower.probability < tau:
+        doubts.append(
+            f"its probability is below tau, {tau:.3f}: its conductors and its body support it"
+        )
+    elif tau is not None and tower.probability < (1 + tau) / 2:
+        doubts.append(f"its probability is not far above tau, {tau:.3f}")
+    return tuple(doubts)
+
+
+def _sentence(share: float) -> str:
+    if abs(share) < NEGLIGIBLE:
+        return f"contributed less than {NEGLIGIBLE:.0%}"
+    side = "supports a tower" if share > 0 else "opposes a tower"
+    return f"{side}, {abs(share):.0%} of the observer"
 
 
 def meanings(model: VoxelModel, card: ModelCard) -> list[tuple[str, float, str, str]]:
@@ -122,11 +123,3 @@ def meanings(model: VoxelModel, card: ModelCard) -> list[tuple[str, float, str, 
         for name in model.names
     ]
     return rows
-
-
-def read_receipts(geojson: str | Path, model: str | Path) -> list[Receipt]:
-    """Receipts from files."""
-    from scenenet.core.files import read_json
-    from scenenet.models.model_file import read_model
-
-    return receipts(read_json(geojson), *read_model(model))

@@ -1,4 +1,4 @@
-"""Where a survey has points: its occupied voxels, asked for by place."""
+"""The occupied voxels of a survey, looked up by place."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from scenenet.prediction.tiling import EDGE, TileSpool
 
 KEPT_TILES = 64
-"""Tiles that are kept at hand: what is asked for next mostly lies in the same ones."""
+"""Tiles kept in memory: successive look-ups mostly need the same ones."""
 
 
-class OccupiedPlaces:
-    """The occupied voxels of a survey, read tile by tile where they are asked for."""
+class OccupiedVoxels:
+    """The occupied voxels of a survey; each tile is read when a look-up needs it."""
 
     def __init__(self, spool: TileSpool) -> None:
         self._spool = spool
@@ -25,7 +25,7 @@ class OccupiedPlaces:
         self._centres = lru_cache(maxsize=KEPT_TILES)(self._read)
 
     def __call__(self, place: np.ndarray, radius: float) -> np.ndarray:
-        """(M, 3) m, middles of the occupied voxels within a planar radius in m of a place (2,)."""
+        """(M, 3) m, centres of the occupied voxels within a planar radius in m of a place (2,)."""
         low, high = (np.floor((place + r) / self._edge).astype(int) for r in (-radius, radius))
         near = [np.empty((0, 3))]
         for x in range(low[0], high[0] + 1):

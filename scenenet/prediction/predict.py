@@ -1,49 +1,91 @@
-"""A whole survey, seamless: tiles with halo, then towers, then every point back."""
+"""Prediction of a whole survey: tiles with a halo, then towers, then the points."""
 
 from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenenet.core.errors import InputError
-from scenenet.core.files import write_json
 from scenenet.core.progress import track
 from scenenet.detection.settings import DetectionSettings
-from scenenet.pointcloud import add_dimensions, iter_chunks, survey_in_metres
+from scenenet.detection.survey_tower import SurveyTower
+from scenenet.pointcloud import iter_chunks, survey_in_metres
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.tile_answers import TileAnswers
+from scenenet.prediction.tile_predictions import PointPredictions, TilePredictions
 from scenenet.prediction.tiling import TileSpool
-from scenenet.prediction.tower_map import geojson
+
+if TYPE_CHECKING:
+    import pyproj
+
+    from scenenet.models.base import VoxelModel
+    from scenenet.models.model_file import ModelCard
 
 
+@dataclass(frozen=True)
+class SurveyPrediction:
+    """The predictions of a model for a survey.
+
+    Attributes:
+        survey: the file of the survey.
+        model, card: the model and what its file says about it.
+        settings, detection: the settings of the prediction.
+        crs: CRS of the survey; None where the file names none.
+        n_points, n_tiles: points of the survey, and tiles that hold a point.
+        voxel_size: m.
+        towers: the towers found, highest probability first.
+        tiles: the predictions on disk; they exist inside the ``with`` block of ``predict_survey``.
+        started: ``time.perf_counter()`` at the start.
+    """
+
+    survey: Path
+    model: VoxelModel
+    card: ModelCard
+    settings: PredictSettings
+    detection: DetectionSettings
+    crs: pyproj.CRS | None
+    n_points: int
+    n_tiles: int
+    voxel_size: float
+    towers: tuple[SurveyTower, ...]
+    tiles: TilePredictions
+    started: float
+
+    @property
+    def geneos(self) -> tuple[str, ...]:
+        """Names of the GENEOs that the shares belong to; empty for a model without GENEOs."""
+        return self.tiles.geneos
+
+    def look_up(self, xyz: np.ndarray) -> PointPredictions:
+        """Probability, tower id and shares of points (n, 3) m of the survey."""
+        return self.tiles.look_up(xyz)
+
+
+@contextmanager
 def predict_survey(
-    path: str | Path,
+    survey: str | Path,
     model: str | Path,
-    out_laz: str | Path,
-    out_geojson: str | Path,
-    out_summary: str | Path,
     settings: PredictSettings,
     detection: DetectionSettings,
-) -> dict[str, Any]:
-    """Classify a survey and list its towers.
+) -> Iterator[SurveyPrediction]:
+    """Predict every occupied voxel of a survey and find its towers.
 
-    Memory is bounded by a chunk of points and a tile of voxels. The survey is read twice: once to
-    learn which voxels are occupied, once to give every point its answer.
+    Memory is bounded by a chunk of points and a tile of voxels. The predictions lie in a temporary
+    folder, which is removed at the end of the ``with`` block::
+
+        with predict_survey("line.laz", "model.json", PredictSettings(), DetectionSettings()) as p:
+            print(p.towers, p.look_up(xyz).probability)
+
+    ``scenenet.prediction.writers`` writes a prediction to files.
 
     Args:
-        path: LAS, LAZ, COPC or TS40K sample.
+        survey: LAS, LAZ, COPC or TS40K sample.
         model: model file with tau.
-        out_laz: every input point, in order, with ``tower_probability``, ``tower_id`` and a
-            ``share_GENEO`` for each GENEO.
-        out_geojson: a point per tower.
-        out_summary: counts, settings and times.
-
-    Returns:
-        the summary.
 
     Raises:
         InputError: the survey or the model cannot be used.
@@ -51,60 +93,33 @@ def predict_survey(
     from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
 
-    begin = time.perf_counter()
+    started = time.perf_counter()
     trained, card = read_model(model)
-    tau = card.threshold()  # before the work: a model without one cannot say what a tower is
+    tau = card.threshold()  # fail before the work: without tau there is no tower
     geneos = trained.names if isinstance(trained, GeneoModel) else []
     voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
-    name, crs = Path(path).name, survey_in_metres(path).crs
+    name, crs = Path(survey).name, survey_in_metres(survey).crs
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
         spool = TileSpool(Path(scratch), voxel_size)
         n_points = 0
-        chunks = iter_chunks(path, chunk_points=settings.chunk_points)
+        chunks = iter_chunks(survey, chunk_points=settings.chunk_points)
         for chunk in track(chunks, f"{name}: chunks read"):
             spool.add(chunk.xyz)
             n_points += len(chunk)
-        answers = TileAnswers(spool, Path(scratch), len(geneos))
-        answers.compute(trained, card, f"{name}: tiles predicted")
-        towers = answers.find_towers(tau, detection)
-        _write_points(path, out_laz, answers, geneos, n_points)
-    write_json(out_geojson, geojson(towers, geneos, crs))
-    summary = {
-        "survey": str(path),
-        "model": card.name,
-        "points": n_points,
-        "towers": len(towers),
-        "tau": tau,
-        "voxel_size_m": voxel_size,
-        "kernel_size": list(trained.kernel_size),
-        "tiles": len(spool),
-        "crs": None if crs is None else crs.to_string(),
-        "seconds": time.perf_counter() - begin,
-        "settings": settings.model_dump() | {"detection": detection.model_dump()},
-        "model_provenance": card.provenance,
-    }
-    write_json(out_summary, summary)
-    return summary
-
-
-def _write_points(
-    path: str | Path, out_laz: str | Path, answers: TileAnswers, geneos: list[str], n_points: int
-) -> None:
-    """Every point back, with its answer.
-
-    Raises:
-        InputError: the survey has not the number of points any more that it had when it was read.
-    """
-    dimensions: dict[str, tuple[type, str]] = {
-        "tower_probability": (np.float32, "probability of a tower"),
-        "tower_id": (np.uint32, "tower number, 0 none"),
-    }
-    dimensions |= {f"share_{geneo}": (np.float32, "share in the answer") for geneo in geneos}
-    written = add_dimensions(path, out_laz, dimensions, lambda xyz: answers.of_points(xyz, geneos))
-    if written != n_points:
-        Path(out_laz).unlink()
-        raise InputError(
-            f"{n_points} points were read at first and {written} when writing",
-            file=path,
-            remedy="The file changed meanwhile; run again when nothing writes to it",
+        tiles = TilePredictions(spool, Path(scratch), geneos)
+        tiles.compute(trained, card, f"{name}: tiles predicted")
+        towers = tuple(tiles.find_towers(tau, detection))
+        yield SurveyPrediction(
+            survey=Path(survey),
+            model=trained,
+            card=card,
+            settings=settings,
+            detection=detection,
+            crs=crs,
+            n_points=n_points,
+            n_tiles=len(spool),
+            voxel_size=voxel_size,
+            towers=towers,
+            tiles=tiles,
+            started=started,
         )

@@ -1,28 +1,27 @@
-"""The page that answers "why is this a tower?" for one survey."""
+"""The page that explains every tower of one survey."""
 
 from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from scenenet.core.files import read_json, write_text
+from scenenet.core.files import write_text
 from scenenet.core.progress import track
 from scenenet.detection.settings import DetectionSettings
 from scenenet.figures import Picture
 from scenenet.figures.plots.point_clouds import View, side_views
-from scenenet.interpretability.explanations import Receipt, meanings, receipts
-from scenenet.models.model_file import read_model
-from scenenet.prediction.predict import predict_survey
+from scenenet.interpretability.explanations import TowerExplanation, explanations, meanings
+from scenenet.pointcloud import iter_chunks
+from scenenet.prediction.predict import SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section, Text, table, write
 from scenenet.report.page import render
 
-POINTS_A_PICTURE = 20_000
+POINTS_PER_PICTURE = 20_000
 
 
 def explain_survey(
@@ -31,117 +30,102 @@ def explain_survey(
     out: str | Path,
     settings: PredictSettings,
     detection: DetectionSettings,
-) -> list[Receipt]:
-    """Predict a survey and write a page with the receipt and a picture of every tower.
+) -> list[TowerExplanation]:
+    """Predict a survey and write a page with the explanation and a picture of every tower.
 
     Args:
         survey: LAS, LAZ, COPC or TS40K sample.
         model: model file with tau.
-        out: HTML file to write; needs no other file and no network.
+        out: HTML file to write; it needs no other file and no network.
 
     Raises:
         InputError: the survey or the model cannot be used.
     """
-    trained, card = read_model(model)
+    with predict_survey(survey, model, settings, detection) as prediction:
+        card = prediction.card
+        explained = explanations(prediction.towers, card)
+        surroundings = list(_surroundings(prediction, explained))
+    facts = [
+        ("points", write(prediction.n_points, "count")),
+        ("towers", write(len(explained), "count")),
+        ("model", card.name),
+        ("tau", write(card.tau, "score")),
+        ("voxel size [m]", write(prediction.voxel_size, "metres")),
+    ]
+    blocks = [Facts(facts), *_parameters(meanings(prediction.model, card))]
+    sections = [Section("survey", Path(survey).name, blocks)]
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
-        folder = Path(scratch)
-        laz, geojson = folder / "survey.laz", folder / "towers.geojson"
-        summary = predict_survey(
-            survey, model, laz, geojson, folder / "summary.json", settings, detection
-        )
-        found = receipts(read_json(geojson), trained, card)
-        surroundings = _surroundings(laz, found)
-        blocks: list[Block] = [
-            Facts(
-                [
-                    ("points", write(summary["points"], "count")),
-                    ("towers", write(len(found), "count")),
-                    ("model", card.name),
-                    ("tau", write(card.tau, "score")),
-                    ("voxel [m]", write(summary["voxel_size_m"], "metres")),
-                ]
-            )
-        ]
-        blocks += _numbers(meanings(trained, card))
-        sections = [Section("survey", Path(survey).name, blocks)]
-        for receipt, (xyz, views) in zip(found, surroundings, strict=True):
-            picture = folder / f"{receipt.id}.png"
-            sections.append(_section(receipt, xyz, views, picture))
+        for explanation, (xyz, views) in zip(explained, surroundings, strict=True):
+            picture = Path(scratch) / f"{explanation.id}.png"
+            sections.append(_section(explanation, xyz, views, picture))
         title = f"Why these are towers: {Path(survey).name}"
         write_text(out, render(sections, title, f"model {card.name}, {card.provenance}"))
-    return found
+    return explained
 
 
-def _numbers(rows: list[tuple[str, float, str, str]]) -> list[Block]:
-    """The table of a model's numbers; nothing for a model whose numbers have no meaning."""
+def _parameters(rows: list[tuple[str, float, str, str]]) -> list[Block]:
+    """The table of the parameters of a model; a sentence for a model whose weights mean nothing."""
     if not rows:
-        return [Text("This model has no parts with a meaning, so it can give no reason.")]
+        return [Text("The weights of this model have no meaning of their own: no explanation.")]
     frame = pd.DataFrame(rows, columns=["name", "value", "unit", "meaning"])
     columns = [
-        Column("name", "number"),
+        Column("name", "parameter"),
         Column("value", "value", "number"),
         Column("unit", "unit"),
-        Column("meaning", "what it is"),
+        Column("meaning", "meaning"),
     ]
-    return [table(frame, columns, "The numbers that decide, and what they mean.")]
+    return [table(frame, columns, "The parameters that decide, and their meaning.")]
 
 
-def _section(receipt: Receipt, xyz: np.ndarray, views: list[View], picture: Path) -> Section:
-    blocks: list[Block] = [
-        Facts(
-            [
-                ("x [m]", f"{receipt.x:.2f}"),
-                ("y [m]", f"{receipt.y:.2f}"),
-                ("height [m]", f"{receipt.height:.1f}"),
-                ("probability", write(receipt.probability, "score")),
-            ]
-        )
+def _section(
+    explanation: TowerExplanation, xyz: np.ndarray, views: list[View], picture: Path
+) -> Section:
+    facts = [
+        ("x [m]", f"{explanation.x:.2f}"),
+        ("y [m]", f"{explanation.y:.2f}"),
+        ("height [m]", f"{explanation.height:.1f}"),
+        ("probability", write(explanation.probability, "score")),
     ]
-    blocks.append(Notes("What stands there", receipt.evidence))
-    if receipt.contributions:
-        frame = pd.DataFrame(receipt.contributions, columns=["geneo", "share", "said"])
+    blocks: list[Block] = [Facts(facts), Notes("Measurements", explanation.evidence)]
+    if explanation.contributions:
+        frame = pd.DataFrame(explanation.contributions, columns=["geneo", "share", "sentence"])
         columns = [
             Column("geneo", "GENEO"),
             Column("share", "share", "score"),
-            Column("said", "what it says"),
+            Column("sentence", "meaning"),
         ]
-        blocks.append(table(frame, columns, "Who contributed what, over the tower's voxels."))
-    if receipt.doubts:
-        blocks.append(Notes("Look again", receipt.doubts))
+        caption = "Mean contribution of each GENEO over the detected voxels of the tower."
+        blocks.append(table(frame, columns, caption))
+    if explanation.doubts:
+        blocks.append(Notes("Check this tower", explanation.doubts))
     if len(xyz):
         alt = side_views(xyz, views, picture)
         caption = (
             "The tower and its surroundings from the side: the probability of each point, and how "
-            "much of the answer each GENEO put in for a tower."
+            "much each GENEO contributed in favour of a tower."
         )
-        title = f"Tower {receipt.id}"
-        blocks.append(Figure(Picture(picture, title, alt, caption, "receipt")))
-    return Section(f"tower-{receipt.id}", f"Tower {receipt.id}", blocks)
+        title = f"Tower {explanation.id}"
+        blocks.append(Figure(Picture(picture, title, alt, caption, "explanation")))
+    return Section(f"tower-{explanation.id}", f"Tower {explanation.id}", blocks)
 
 
-def _surroundings(laz: Path, towers: Sequence[Receipt]) -> Iterator[tuple[np.ndarray, list[View]]]:
-    """Points (n, 3) within a tower's height of it, and how to colour them, tower by tower."""
-    import laspy
-
-    kept: list[list[Any]] = [[] for _ in towers]
-    with laspy.open(laz) as reader:
-        names = [n for n in reader.header.point_format.extra_dimension_names if _is_answer(n)]
-        for chunk in track(reader.chunk_iterator(1_000_000), "pictures: chunks read"):
-            xyz = np.stack([chunk.x, chunk.y, chunk.z], axis=1)
-            for receipt, parts in zip(towers, kept, strict=True):
-                near = np.flatnonzero(
-                    np.hypot(xyz[:, 0] - receipt.x, xyz[:, 1] - receipt.y) <= receipt.height
-                )
-                parts.append(np.column_stack([xyz[near], *(chunk[n][near] for n in names)]))
+def _surroundings(
+    prediction: SurveyPrediction, towers: Sequence[TowerExplanation]
+) -> Iterator[tuple[np.ndarray, list[View]]]:
+    """For each tower the points (n, 3) m within its height in plan, and the views of them."""
+    kept: list[list[np.ndarray]] = [[np.empty((0, 4 + len(prediction.geneos)))] for _ in towers]
+    for chunk in track(iter_chunks(prediction.survey), "pictures: chunks read"):
+        for tower, parts in zip(towers, kept, strict=True):
+            apart = np.hypot(chunk.xyz[:, 0] - tower.x, chunk.xyz[:, 1] - tower.y)
+            xyz = chunk.xyz[apart <= tower.height]
+            points = prediction.look_up(xyz)
+            parts.append(np.column_stack([xyz, points.probability, points.shares]))
     for parts in kept:
         rows = np.concatenate(parts)
-        rows = rows[:: max(1, len(rows) // POINTS_A_PICTURE)]
+        rows = rows[:: max(1, len(rows) // POINTS_PER_PICTURE)]
+        names = ["tower probability", *(geneo.replace("_", " ") for geneo in prediction.geneos)]
         views = [
-            View(name.removeprefix("share_").replace("_", " "), column.clip(0, 1), "probability")
+            View(name, column.clip(0, 1), "probability")
             for name, column in zip(names, rows.T[3:], strict=True)
         ]
         yield rows[:, :3], views
-
-
-def _is_answer(dimension: str) -> bool:
-    return dimension == "tower_probability" or dimension.startswith("share_")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenenet.detection.detect import among, detect_towers, whole_tower
+from scenenet.detection.detect import among, body_voxels, detect_towers
 from scenenet.detection.settings import DetectionSettings
 
 TAU = 0.5
@@ -209,7 +209,7 @@ def test_all_of_a_body_is_the_tower_from_above_its_foot_to_its_top(lattice, pole
     everything = lattice.together(lattice.ground(), around, beside, apart)
     [tower] = detect(upper(body), everything)
     mine = {
-        tuple(place) for place in everything[whole_tower(tower, everything, DetectionSettings())]
+        tuple(place) for place in everything[body_voxels(tower, everything, DetectionSettings())]
     }
     assert {tuple(p) for p in np.concatenate([body, beside])} >= {
         p for p in mine if abs(p[0] - tower.x) < 0.1 and abs(p[1] - tower.y) < 0.1
@@ -228,7 +228,7 @@ def test_the_body_of_a_wide_tower_reaches_further(lattice, pole, width, reach):
     tower = replace(tower, width=width)
     x = np.arange(0, 8, 0.05)
     ring = np.column_stack([tower.x + x, np.full(len(x), tower.y), np.full(len(x), tower.base + 9)])
-    mine = whole_tower(tower, ring, DetectionSettings())
+    mine = body_voxels(tower, ring, DetectionSettings())
     assert x[mine].max() == pytest.approx(reach, abs=0.06)
     assert mine[x < reach - 0.01].all()
 

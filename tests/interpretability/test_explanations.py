@@ -1,55 +1,66 @@
-"""The receipt of a tower says what was measured there and what should make a person look again."""
+"""The explanation of a tower names the measurements there and the reasons to check it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from scenenet.interpretability.explanations import Receipt, receipts
+from scenenet.detection.survey_tower import SurveyTower
+from scenenet.interpretability.explanations import TowerExplanation, explanations
+
+TOWER = SurveyTower(
+    id=1, x=1.0, y=2.0, height=21.4, base=104.2, width=1.9, conductor_directions=2,
+    conductor_bearings=(251.2, 70.8), probability=0.99, points=400, edge_distance=50.0,
+    contributions={"cylinder": 0.6, "arrow": -0.4},
+)  # fmt: skip
+ONE_SIDE = {"conductor_directions": 1, "conductor_bearings": (70.8,)}
 
 
 @pytest.fixture
-def receipt(pole_finder):
-    """A function that gives the receipt of a tower with some facts changed."""
-    facts = {
-        "id": 1, "height": 21.4, "base_elevation": 104.2, "width": 1.9, "probability": 0.99,
-        "wire_directions": 2, "wire_bearings": [251.2, 70.8], "points": 400,
-        "edge_distance": 50.0, "contributions": {"cylinder": 0.6, "arrow": -0.4},
-    }  # fmt: skip
+def explain(pole_finder):
+    """A function that explains ``TOWER`` with some of its columns changed."""
+    _, card = pole_finder
 
-    def make(**changes) -> Receipt:
-        point = {"type": "Point", "coordinates": [1.0, 2.0]}
-        feature = {"geometry": point, "properties": facts | changes}
-        [one] = receipts({"features": [feature]}, *pole_finder)
+    def make(**changes) -> TowerExplanation:
+        [one] = explanations([replace(TOWER, **changes)], card)
         return one
 
     return make
 
 
-def test_what_stands_there_is_said_in_words(receipt):
-    said = " ".join(receipt().evidence)
-    assert "21 m tall" in said
-    assert "2 m wide" in said
-    assert "71° and 251°" in said
+def test_the_measurements_are_given_in_words(explain):
+    evidence = " ".join(explain().evidence)
+    assert "21 m tall" in evidence
+    assert "2 m wide" in evidence
+    assert "71° and 251°" in evidence
 
 
-def test_a_tower_in_the_midst_of_a_line_raises_no_doubt(receipt):
-    assert receipt().doubts == ()
+def test_the_contributions_come_with_their_sign_and_share(explain):
+    (first, share, sentence), (second, _, other) = explain().contributions
+    assert (first, share, second) == ("cylinder", 0.6, "arrow")
+    assert "supports a tower, 60%" in sentence
+    assert "opposes a tower, 40%" in other
+
+
+def test_a_tower_in_the_middle_of_a_line_raises_no_doubt(explain):
+    assert explain().doubts == ()
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"wire_directions": 1, "wire_bearings": [70.8]}, "one direction"),
-        ({"edge_distance": 12.0}, "may be cut off"),
-        ({"probability": 0.6}, "under tau"),
+        (ONE_SIDE, "one direction"),
+        ({"edge_distance": 12.0}, "may be missing"),
+        ({"probability": 0.6}, "below tau"),
         ({"probability": 0.8}, "not far above tau"),
     ],
 )
-def test_what_is_doubtful_is_said(receipt, changes, words):
-    [doubt] = receipt(**changes).doubts
+def test_each_doubtful_measurement_is_named(explain, changes, words):
+    [doubt] = explain(**changes).doubts
     assert words in doubt
 
 
-def test_wires_that_the_data_end_under_are_no_doubt_of_their_own(receipt):
-    one_side = receipt(wire_directions=1, wire_bearings=[70.8], edge_distance=5.0)
+def test_conductors_cut_off_by_the_edge_of_the_data_raise_no_second_doubt(explain):
+    one_side = explain(**ONE_SIDE, edge_distance=5.0)
     assert not any("one direction" in doubt for doubt in one_side.doubts)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.prediction.occupied_voxels import OccupiedPlaces
+from scenenet.prediction.occupied_voxels import OccupiedVoxels
 from scenenet.prediction.tiling import TileSpool
 
 ORIGIN = np.array([544_000.0, 4_634_000.0, 80.0])
@@ -28,11 +28,11 @@ def everything(spool) -> np.ndarray:
 @pytest.mark.parametrize("away", [(0, 0), (-96, 96), (-149, 149), (170, 0), (900, -900)])
 def test_as_a_search_through_all(spool, everything, radius, away):
     place = ORIGIN[:2] + away
-    found = OccupiedPlaces(spool)(place, radius)
+    found = OccupiedVoxels(spool)(place, radius)
     apart = np.hypot(*(everything[:, :2] - place).T)
     assert {tuple(v) for v in found} == {tuple(v) for v in everything[apart <= radius]}
     assert len(found) == (apart <= radius).sum()
 
 
 def test_a_survey_without_points_has_none(tmp_path):
-    assert OccupiedPlaces(TileSpool(tmp_path, 1.0))(np.zeros(2), 100.0).shape == (0, 3)
+    assert OccupiedVoxels(TileSpool(tmp_path, 1.0))(np.zeros(2), 100.0).shape == (0, 3)

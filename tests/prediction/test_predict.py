@@ -20,8 +20,8 @@ from scenenet.models.factory import new_model
 from scenenet.models.model_file import ModelCard, read_model, write_model
 from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
 from scenenet.pointcloud import PointCloud, read, write_las
-from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.writers import predict_to_files
 from scenenet.training.train import fit
 from scenenet.training.tuning import choose
 
@@ -41,7 +41,7 @@ SHARES = [name for name in ADDED if name.startswith("share_")]
 
 @dataclass(frozen=True)
 class Prediction:
-    """What predict_survey wrote and returned."""
+    """The files that predict_to_files wrote, and the summary that it returned."""
 
     laz: Path
     towers: dict[str, Any]
@@ -61,9 +61,9 @@ def predict(
 ) -> Prediction:
     folder.mkdir(exist_ok=True)
     laz, geojson, summary = (folder / n for n in ("out.laz", "towers.geojson", "summary.json"))
-    returned = predict_survey(
+    returned = predict_to_files(
         survey, model, laz, geojson, summary, PredictSettings(**settings), detection
-    )
+    ).to_json()
     assert json.loads(summary.read_text()) == returned
     return Prediction(laz, json.loads(geojson.read_text()), returned)
 

@@ -12,7 +12,7 @@ from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
 from scenenet.models.cnn import CNN
 from scenenet.models.scenenet import SceneNet
-from scenenet.prediction.tile_answers import answer_tile
+from scenenet.prediction.tile_predictions import predict_tile
 from scenenet.prediction.tiling import EDGE, TileSpool, code_of, groups
 
 ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])
@@ -116,7 +116,7 @@ def test_groups_gather_the_rows_of_each_code(codes):
 
 
 class Card:
-    """What answer_tile needs to know of a model's card."""
+    """What predict_tile needs to know of a model's card."""
 
     def __init__(self, measurement: str) -> None:
         self.measurement = measurement
@@ -129,7 +129,7 @@ def seamless(spool: TileSpool, model, measurement: str) -> tuple[np.ndarray, np.
     card = Card(measurement)
     in_tiles = {}
     for tile in spool.tiles():
-        probability, _ = answer_tile(spool, tile, model, card, fullest)
+        probability, _ = predict_tile(spool, tile, model, card, fullest)
         in_tiles |= dict(zip(map(tuple, tile.zyx().tolist()), probability.tolist(), strict=True))
     zyx = np.array(list(voxels))
     low = zyx.min(axis=0)
@@ -172,7 +172,7 @@ def test_where_the_tiles_lie_does_not_show(tmp_path_factory, shift, seed):
         spool = spooled(tmp_path_factory.mktemp("tiles"), moved)
         found = {}
         for tile in spool.tiles():
-            probability, _ = answer_tile(spool, tile, model, Card("presence"), 1)
+            probability, _ = predict_tile(spool, tile, model, Card("presence"), 1)
             found |= dict(zip(map(tuple, tile.zyx().tolist()), probability.tolist(), strict=True))
         answers.append(found)
     here, there = answers

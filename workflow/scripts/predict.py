@@ -5,10 +5,10 @@ import _job
 
 def predict(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.prediction.predict import predict_survey
     from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.writers import predict_to_files
 
-    predict_survey(
+    predict_to_files(
         job.input.survey,
         job.input.model,
         job.output.survey,

@@ -1,0 +1,149 @@
+"""The tower list of a survey: the one declaration of its columns.
+
+The GeoJSON, the tables of the report and the reference page all follow from the fields of
+``SurveyTower``. A new column is a new field here, and the code that measures it
+(``scenenet.prediction.tile_predictions``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from scenenet.core.errors import InputError
+from scenenet.core.files import read_json
+
+
+def _column(
+    unit: str,
+    description: str,
+    *,
+    heading: str | None = None,
+    name: str | None = None,
+    geometry: bool = False,
+) -> Any:
+    facts = {"unit": unit, "description": description, "heading": heading}
+    return field(metadata=facts | {"name": name, "geometry": geometry})
+
+
+@dataclass(frozen=True)
+class SurveyTower:
+    """A tower of the tower list. ``TOWER_COLUMNS`` says what each field is."""
+
+    id: int = _column("", "number in the list, from 1", heading="tower")
+    x: float = _column(
+        "m", "easting of the middle of its body, in the CRS of the survey", heading="x",
+        geometry=True,
+    )  # fmt: skip
+    y: float = _column("m", "northing of the same place", heading="y", geometry=True)
+    height: float = _column("m", "height of its top above the ground at its foot", heading="height")
+    base: float = _column(
+        "m", "elevation of the ground at its foot", heading="base elevation", name="base_elevation"
+    )
+    width: float = _column("m", "width of its body where nothing touches it", heading="width")
+    conductor_directions: int = _column(
+        "", "number of directions in which conductors leave it", heading="directions of conductors",
+        name="wire_directions",
+    )  # fmt: skip
+    conductor_bearings: tuple[float, ...] = _column(
+        "degrees", "bearing of each of these directions, clockwise from north, the longest span "
+        "first", name="wire_bearings",
+    )  # fmt: skip
+    probability: float = _column("1", "highest probability of its voxels", heading="probability")
+    points: int = _column(
+        "", "points of the survey in its voxels, detected or part of its body", heading="points"
+    )
+    edge_distance: float = _column(
+        "m", "distance to the edge of the data, at most 50 m", heading="distance to the data edge"
+    )
+    contributions: Mapping[str, float] = _column(
+        "1", "mean share of each GENEO in the observer over its detected voxels; positive shares "
+        "support a tower, negative ones oppose it",
+    )  # fmt: skip
+
+    def to_feature(self) -> dict[str, Any]:
+        """The tower as a GeoJSON feature."""
+        properties = {c.name: _plain(c.value(self)) for c in TOWER_COLUMNS if not c.geometry}
+        return {
+            "type": "Feature",
+            "id": self.id,
+            "geometry": {"type": "Point", "coordinates": [self.x, self.y]},
+            "properties": properties,
+        }
+
+    @classmethod
+    def from_feature(cls, feature: Mapping[str, Any]) -> SurveyTower:
+        """The tower that ``to_feature`` wrote.
+
+        Raises:
+            KeyError: a column is missing.
+        """
+        x, y = feature["geometry"]["coordinates"][:2]
+        properties = feature["properties"]
+        values = {c.field: properties[c.name] for c in TOWER_COLUMNS if not c.geometry}
+        values["conductor_bearings"] = tuple(values["conductor_bearings"])
+        return cls(x=x, y=y, **values)
+
+
+@dataclass(frozen=True)
+class TowerColumn:
+    """A column of the tower list.
+
+    Attributes:
+        field: attribute of ``SurveyTower``.
+        name: name in files.
+        unit: ``m``, ``degrees``, ``1`` for a ratio, empty for a count or number.
+        description: what it is, for the reference page.
+        heading: name in tables for people, without the unit; None where tables leave it out.
+        geometry: whether GeoJSON has it as the geometry and not as a property.
+    """
+
+    field: str
+    name: str
+    unit: str
+    description: str
+    heading: str | None
+    geometry: bool
+
+    def value(self, tower: SurveyTower) -> Any:
+        """The value of this column for a tower."""
+        return getattr(tower, self.field)
+
+
+TOWER_COLUMNS = tuple(
+    TowerColumn(
+        field=f.name,
+        name=f.metadata["name"] or f.name,
+        unit=f.metadata["unit"],
+        description=f.metadata["description"],
+        heading=f.metadata["heading"],
+        geometry=f.metadata["geometry"],
+    )
+    for f in fields(SurveyTower)
+)
+"""Every column of the tower list, in the order in which files and tables have them."""
+
+
+def read_towers(path: str | Path) -> list[SurveyTower]:
+    """The tower list of a survey, from the GeoJSON file that ``scenenet predict`` wrote.
+
+    Raises:
+        InputError: the file is missing or is not a tower list.
+    """
+    try:
+        return [SurveyTower.from_feature(feature) for feature in read_json(path)["features"]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"not a tower list of this version ({type(error).__name__}: {error})",
+            file=path,
+            remedy="Predict the survey again",
+        ) from None
+
+
+def _plain(value: Any) -> Any:
+    """The value as JSON holds it."""
+    if isinstance(value, tuple):
+        return list(value)
+    return dict(value) if isinstance(value, Mapping) else value

@@ -1,0 +1,237 @@
+"""The predictions of a model for a survey, tile by tile on disk, and the towers found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenenet.core.progress import track
+from scenenet.detection.detect import DetectedTower, body_voxels, detect_towers
+from scenenet.detection.edge_distance import LOOK_M, edge_distance
+from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.survey_tower import SurveyTower
+from scenenet.prediction.occupied_voxels import OccupiedVoxels
+from scenenet.prediction.tiling import EDGE, Tile, TileSpool, code_of, groups
+
+if TYPE_CHECKING:
+    from scenenet.models.base import VoxelModel
+    from scenenet.models.model_file import ModelCard
+
+
+@dataclass(frozen=True)
+class TilePrediction:
+    """The predictions for the occupied voxels of a tile.
+
+    Attributes:
+        voxel: (M,) int32 positions within the tile, ascending.
+        probability: (M,) float32.
+        shares: (M, K) float32, contribution of each GENEO to the observer, divided by the sum of
+            the absolute contributions. K is 0 for a model without GENEOs.
+        tower: (M,) uint32 id of the tower that the voxel belongs to, 0 for none.
+    """
+
+    voxel: np.ndarray
+    probability: np.ndarray
+    shares: np.ndarray
+    tower: np.ndarray
+
+    def save(self, path: Path) -> None:
+        np.savez(path, **self.__dict__)
+
+    @classmethod
+    def read(cls, path: Path) -> TilePrediction:
+        with np.load(path, allow_pickle=False) as arrays:
+            return cls(**{name: arrays[name] for name in arrays.files})
+
+
+@dataclass(frozen=True)
+class PointPredictions:
+    """The predictions for points of a survey.
+
+    Attributes:
+        probability: (n,) float32, of the voxel that holds the point.
+        tower_id: (n,) uint32, 0 for none.
+        shares: (n, K) float32; see ``TilePrediction``.
+    """
+
+    probability: np.ndarray
+    tower_id: np.ndarray
+    shares: np.ndarray
+
+
+class TilePredictions:
+    """The predictions of a model for every tile of a survey, one file a tile."""
+
+    def __init__(self, spool: TileSpool, folder: Path, geneos: Sequence[str]) -> None:
+        """Nothing is predicted yet.
+
+        Args:
+            spool: the occupied voxels of the survey.
+            folder: existing folder for the predictions.
+            geneos: names of the GENEOs of the model; empty for a model without any.
+        """
+        self.spool = spool
+        self.geneos = tuple(geneos)
+        self._folder = folder
+        self._cached = lru_cache(maxsize=64)(self._read)
+
+    def compute(self, model: VoxelModel, card: ModelCard, label: str) -> None:
+        """Run the model over all tiles."""
+        fullest = 1
+        if card.measurement == "density":
+            # One maximum for the whole survey: one for each tile would show as seams.
+            fullest = max((int(tile.count.max()) for tile in self.spool.tiles()), default=1)
+        for tile in track(self.spool.tiles(), label, total=len(self.spool)):
+            probability, shares = predict_tile(self.spool, tile, model, card, fullest)
+            tower = np.zeros(len(tile.voxel), np.uint32)
+            prediction = TilePrediction(tile.voxel, probability, shares, tower)
+            prediction.save(self._path(code_of(tile.place)))
+
+    def find_towers(self, tau: float, settings: DetectionSettings) -> list[SurveyTower]:
+        """Find the towers of the survey and write the id of each into its voxels."""
+        zyx, probability, shares = self._detected(settings.threshold(tau))
+        occupied = OccupiedVoxels(self.spool)
+        found = detect_towers(
+            self.spool.centres(zyx), probability, occupied, self.spool.voxel_size, tau, settings
+        )
+        towers = []
+        for number, tower in enumerate(found, start=1):
+            place = np.array([tower.x, tower.y])
+            around = occupied(place, LOOK_M * 1.5)
+            body = around[body_voxels(tower, around, settings)]
+            at_tau = zyx[tower.voxels[probability[tower.voxels] >= tau]]
+            points = self._number(np.concatenate([body, self.spool.centres(at_tau)]), number)
+            distance = edge_distance(place, around[:, :2])
+            mean_shares = shares[tower.voxels].mean(axis=0)
+            towers.append(self._entry(tower, number, points, distance, mean_shares))
+        return towers
+
+    def look_up(self, xyz: np.ndarray) -> PointPredictions:
+        """The predictions for points (n, 3) m of the survey."""
+        probability = np.zeros(len(xyz), np.float32)
+        tower = np.zeros(len(xyz), np.uint32)
+        shares = np.zeros((len(xyz), len(self.geneos)), np.float32)
+        codes, voxels = self.spool.locate(xyz)
+        for code, rows in groups(codes):
+            prediction = self._cached(code)
+            at = np.searchsorted(prediction.voxel, voxels[rows])
+            probability[rows] = prediction.probability[at]
+            tower[rows] = prediction.tower[at]
+            shares[rows] = prediction.shares[at]
+        return PointPredictions(probability, tower, shares)
+
+    def _detected(self, threshold: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The voxels with probability >= ``threshold``: lattice positions (V, 3), probability (V,)
+        and shares (V, K)."""
+        zyx = [np.empty((0, 3), np.int64)]
+        probability = [np.empty(0, np.float32)]
+        shares = [np.empty((0, len(self.geneos)), np.float32)]
+        for tile in self.spool.tiles():
+            prediction = self._read(code_of(tile.place))
+            detected = prediction.probability >= threshold
+            zyx.append(tile.zyx()[detected])
+            probability.append(prediction.probability[detected])
+            shares.append(prediction.shares[detected])
+        return np.concatenate(zyx), np.concatenate(probability), np.concatenate(shares)
+
+    def _entry(
+        self, tower: DetectedTower, number: int, points: int, distance: float, shares: np.ndarray
+    ) -> SurveyTower:
+        return SurveyTower(
+            id=number,
+            x=tower.x,
+            y=tower.y,
+            height=tower.height,
+            base=tower.base,
+            width=tower.width,
+            conductor_directions=len(tower.spans),
+            conductor_bearings=tuple(span.bearing for span in tower.spans),
+            probability=tower.probability,
+            points=points,
+            edge_distance=distance,
+            contributions={
+                geneo: float(share) for geneo, share in zip(self.geneos, shares, strict=True)
+            },
+        )
+
+    def _number(self, centres: np.ndarray, number: int) -> int:
+        """Write the id of a tower into its voxels, (M, 3) m, and count the points in them.
+
+        Voxels of an earlier tower keep its id.
+        """
+        points = 0
+        codes, voxels = self.spool.locate(centres)
+        for code, rows in groups(codes):
+            prediction = self._read(code)
+            at = np.unique(np.searchsorted(prediction.voxel, voxels[rows]))
+            free = at[prediction.tower[at] == 0]
+            prediction.tower[free] = number
+            prediction.save(self._path(code))
+            points += int(self.spool.tile(code).count[free].sum())
+        return points
+
+    def _read(self, code: int) -> TilePrediction:
+        return TilePrediction.read(self._path(code))
+
+    def _path(self, code: int) -> Path:
+        return self._folder / f"{code}.npz"
+
+
+def predict_tile(
+    spool: TileSpool, tile: Tile, model: VoxelModel, card: ModelCard, fullest: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Probability (M,) and shares (M, K) at the occupied voxels of a tile.
+
+    The halo is as wide as the reach of the kernels, so that every voxel gets the value that it
+    would have without tiles.
+
+    Args:
+        fullest: points in the fullest voxel of the survey, for measurement ``density``.
+    """
+    import torch
+
+    from scenenet.convolution.convolve import convolve_at_voxels
+    from scenenet.convolution.occupancy import Occupancy
+    from scenenet.models.geneo_model import GeneoModel
+
+    model = model.at(spool.voxel_size)
+    reach = model.reach
+    shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
+    scene = spool.around(tile.place, reach)
+    density = card.measurement == "density"
+    phi = [(scene.count / fullest).astype(np.float32)] if density else None
+    occupancy = Occupancy.of_grids([scene.voxel], phi, shape)
+    inner = _inner(scene.voxel, shape, reach)
+    with torch.no_grad():
+        if isinstance(model, GeneoModel):
+            parts = convolve_at_voxels(occupancy, model.weighted_kernels())
+            # The shares are those of the voxel that the maximum of the cross-section comes from.
+            rows = model.argmax_rows(occupancy, parts.sum(dim=0))[inner]
+            parts = parts[:, torch.from_numpy(rows)]
+            observed = parts.sum(dim=0)
+            weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
+            shares = (parts / weight).T.contiguous().numpy()
+        else:
+            kernel, bias = model.observer()
+            observed = convolve_at_voxels(occupancy, kernel[None])[0, inner]
+            observed = observed if bias is None else observed + bias
+            shares = np.empty((len(tile.voxel), 0), np.float32)
+        probability = torch.relu(torch.tanh(observed)).numpy()
+    return probability, shares
+
+
+def _inner(
+    voxel: np.ndarray, shape: tuple[int, int, int], reach: tuple[int, int, int]
+) -> np.ndarray:
+    """Rows of ``voxel`` (M,), positions in a tile with its halo, that lie in the tile itself.
+
+    They come in the order of the tile's own voxels, as both are ascending.
+    """
+    zyx = np.unravel_index(voxel, shape)
+    inside = [(axis >= r) & (axis < r + EDGE) for axis, r in zip(zyx, reach, strict=True)]
+    return np.flatnonzero(inside[0] & inside[1] & inside[2])

@@ -1,4 +1,4 @@
-"""``snakemake --report``: every table and figure, with what a reader needs to understand it."""
+"""``snakemake --report`` shows every table and figure with a caption."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with the sheet or the configuration is said before any job starts."""
+"""Mistakes in the sheet or in the configuration are reported before any job starts."""
 
 from __future__ import annotations
 

@@ -10,10 +10,10 @@ import pytest
 pytestmark = pytest.mark.workflow
 
 PREDICTED = {"predict": 1, "prediction_map": 1, "report": 1}
-"""What follows from another best model: there is one survey to classify."""
+"""Jobs after a change of the best model; there is one survey to classify."""
 
 SHOWN = {"figures": 1, "track": 1, "register": 1, "interactive_crop": 3}
-"""What shows the scores of models, besides tables and report."""
+"""Jobs that show the scores of models, besides the tables and the report."""
 
 SCORED = {
     "tune_scenenet": 2,
@@ -27,7 +27,7 @@ SCORED = {
     **SHOWN,
     **PREDICTED,
 }
-"""What follows from trained models: two of each kind."""
+"""Jobs after the training of two models of each kind."""
 
 TRAINED = {"train_scenenet": 2, "train_cnn": 2, **SCORED}
 STUDIED = {"study": 2, "study_figure": 2, "track_studies": 1}
@@ -36,11 +36,11 @@ NOISE = {"label_noise": 2, "join_runs": 1, "experiment_figure": 1, "track_experi
 """Label noise with two seeds, each with a survey of its own."""
 BASELINE = {"boosted_trees": 1}
 LEARNED = {**TRAINED, **STUDIED, **BASELINE}
-"""What follows from other voxels."""
+"""Jobs after a change of the voxels."""
 FROM_CROPS = {**LEARNED, "voxelisation_time": 1}
-"""What follows from other crops."""
+"""Jobs after a change of the crops."""
 SETTINGS = {"resolved_config": 1}
-"""The settings are written down whenever there are others."""
+"""The resolved configuration is written after each change of a setting."""
 
 
 # Surveys
@@ -115,7 +115,7 @@ def test_another_emphasis_of_the_loss_trains_again_and_prepares_nothing(project)
 
 
 def test_swapping_the_values_of_two_settings_trains_again(project):
-    """Snakemake compares parameters as a set, in which they would look the same."""
+    """Snakemake compares the parameters as a set, which does not see the swap."""
     project.configure({"training.loss": {"alpha": 0.1, "epsilon": 5.0}})
     assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOISE}
 

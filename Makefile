@@ -20,7 +20,7 @@ package: $(INSTALLED)  ## build the package, install it in a fresh environment a
 docs: $(INSTALLED)  ## the documentation as a site, under site/; a broken link is an error
 	NO_MKDOCS_2_WARNING=1 $(VENV)/bin/mkdocs build --strict
 
-bench: $(INSTALLED)  ## speed of the convolution beside alternative implementations
+bench: $(INSTALLED)  ## speed of the convolution compared with alternative implementations
 	$(VENV)/bin/scenenet bench
 
 pictures: $(INSTALLED)  ## take docs/images again from the results of make reproduce; needs Chromium

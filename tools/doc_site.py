@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -40,10 +41,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def packages() -> list[str]:
-    """Names of the packages below ``scenenet``, in the order of the import contract if there is
-    one, else by name."""
-    found = {path.parent.name for path in (ROOT / "scenenet").glob("*/__init__.py")}
-    return sorted(found)
+    """Names of the packages below ``scenenet``, in the order of the import contract."""
+    contract = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    layers: list[str] = contract["contracts"][0]["layers"]
+    return layers[::-1]
 
 
 def api_page(package: str) -> str:

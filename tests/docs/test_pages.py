@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,11 +12,16 @@ import typer
 import yaml
 
 from scenenet.cli.app import app
+from scenenet.config.schema import Config
 from scenenet.geneo import registry
 from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import ModelSettings
+from scenenet.synthetic.settings import SyntheticSettings
 
 GENERATED = {"docs/reference/cli.md", "docs/reference/settings.md"}
 """Pages that ``tools/doc_site.py`` makes when the site is built."""
+SNAKEMAKE = {"set-resources"}
+"""Settings of a Snakemake profile in an example."""
 CODE = ("scenenet", "workflow", "config", "tests", "tools", "Snakefile", "Makefile")
 
 
@@ -46,6 +52,30 @@ def test_the_study_of_the_guide_is_accepted(project_root: Path):
     shown = yaml.safe_load(re.search(r"```yaml\n(.*?)```", text, re.DOTALL)[1])
     study = StudySettings(**shown["studies"][0])
     assert len(study.all_variants()) == 3
+
+
+def test_every_setting_in_an_example_is_one_of_the_configuration(project_root: Path):
+    known = Config.model_fields.keys() | ModelSettings.model_fields.keys()
+    known |= SyntheticSettings.model_fields.keys() | SNAKEMAKE
+    examples = 0
+    for page in _pages(project_root):
+        for block in re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL):
+            examples += 1
+            assert yaml.safe_load(block).keys() <= known, f"{page.name}: {block}"
+    assert examples > 4
+
+
+def test_the_tables_in_the_pages_are_those_of_the_code(project_root: Path):
+    path = project_root / "tools" / "doc_tables.py"
+    spec = importlib.util.spec_from_file_location("doc_tables", path)
+    tables = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tables)
+    shown = {}
+    for page in _pages(project_root):
+        shown |= tables.tables_in(page.read_text())
+    assert shown.keys() == tables.TABLES.keys()
+    stale = [name for name, make in tables.TABLES.items() if shown[name] != make()]
+    assert not stale, "run: python tools/doc_tables.py"
 
 
 def test_every_command_of_the_readme_exists(project_root):

@@ -1,0 +1,71 @@
+"""Write the tables in the documentation that follow from the code: ``python tools/doc_tables.py``.
+
+A table stands in a page between ``<!-- NAME -->`` and ``<!-- end -->``; a test compares it with the
+code.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+
+
+def scores() -> str:
+    """Every score column."""
+    from scenenet.metrics.score_columns import SCORE_COLUMNS
+
+    return _table("name", ((c.name, c.unit, c.description) for c in SCORE_COLUMNS))
+
+
+def tower_list() -> str:
+    """Every property of a tower in the tower list."""
+    from scenenet.detection.survey_tower import TOWER_COLUMNS
+
+    properties = [c for c in TOWER_COLUMNS if not c.geometry]
+    return _table("property", ((c.name, c.unit, c.description) for c in properties))
+
+
+def class_schemes() -> str:
+    """Every class scheme."""
+    from scenenet.pointcloud.class_schemes import markdown
+
+    return markdown()
+
+
+TABLES: Mapping[str, Callable[[], str]] = {
+    "class schemes": class_schemes,
+    "scores": scores,
+    "tower list": tower_list,
+}
+"""What stands in the first comment -> the table."""
+
+
+def tables_in(text: str) -> dict[str, str]:
+    """Name -> table of the generated tables in a page."""
+    return dict(re.findall(r"<!-- ([a-z ]+) -->\n(.*?)\n<!-- end -->", text, re.DOTALL))
+
+
+def with_tables(text: str) -> str:
+    """A page with its tables as the code has them."""
+    for name, old in tables_in(text).items():
+        start = f"<!-- {name} -->\n"
+        text = text.replace(f"{start}{old}", f"{start}{TABLES[name]()}")
+    return text
+
+
+def _table(first: str, rows: Iterable[tuple[str, str, str]]) -> str:
+    lines = [f"| `{name}` | {unit} | {meaning} |" for name, unit, meaning in rows]
+    return "\n".join([f"| {first} | unit | meaning |", "|---|---|---|", *lines])
+
+
+def main() -> None:
+    for page in DOCS.rglob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        page.write_text(with_tables(text), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -13,13 +13,6 @@ from pathlib import Path
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
-def scores() -> str:
-    """Every score column."""
-    from scenenet.metrics.score_columns import SCORE_COLUMNS
-
-    return _table("name", ((c.name, c.unit, c.description) for c in SCORE_COLUMNS))
-
-
 def tower_list() -> str:
     """Every property of a tower in the tower list."""
     from scenenet.detection.survey_tower import TOWER_COLUMNS
@@ -37,7 +30,6 @@ def class_schemes() -> str:
 
 TABLES: Mapping[str, Callable[[], str]] = {
     "class schemes": class_schemes,
-    "scores": scores,
     "tower list": tower_list,
 }
 """What stands in the first comment -> the table."""
@@ -45,7 +37,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
 
 def tables_in(text: str) -> dict[str, str]:
     """Name -> table of the generated tables in a page."""
-    return dict(re.findall(r"<!-- ([a-z ]+) -->\n(.*?)\n<!-- end -->", text, re.DOTALL))
+    return dict(re.findall(r"<!-- (?!end)([a-z ]+) -->\n(.*?)\n<!-- end -->", text, re.DOTALL))
 
 
 def with_tables(text: str) -> str:

@@ -1,44 +1,36 @@
-"""A black box to measure SCENE-Net against: boosted trees on features of the voxels.
+"""The baseline: boosted trees on voxel features.
 
-The thesis compares with a CNN alone (5.2.4.2). What the data hold, and how much of it eleven
-numbers reach, is better told by a strong model without any meaning: scikit-learn's
+The thesis only compares with a CNN (5.2.4.2). A strong model without interpretable parts shows
+better how much the data hold and how much of it eleven numbers reach: scikit-learn's
 ``HistGradientBoostingClassifier`` on ``scenenet.baselines.voxel_features``, trained on the same
-crops and scored on the same voxels. Empty voxels are never towers to it.
+crops and scored on the same voxels. It never predicts a tower in an empty voxel.
 
-Its files hold the trees as plain arrays (safetensors) and never a pickle; they are read and used
-without scikit-learn.
+The trees are copied to plain arrays and evaluated by compiled code, without scikit-learn.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 from pydantic import Field
 
-from scenenet.baselines.voxel_features import FEATURES, voxel_features
+from scenenet.baselines.voxel_features import voxel_features
 from scenenet.core.errors import InputError
-from scenenet.core.files import atomic
 from scenenet.core.settings import Settings
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.metrics.threshold_curve import ThresholdCurve
-
-KIND = "blackbox"
-FORMAT = "scenenet-blackbox"
-FORMAT_VERSION = 1
 
 
 class BoostedTreesSettings(Settings):
     """How the trees are grown.
 
-    Of some fifteen settings tried on real crops these had the highest F0.5 on training crops left
-    out, or as good a one with a smaller spread over seeds. Fewer features a split, a quarter as
-    many leaves or lighter towers are worse; the other settings within a factor of two are not.
+    About fifteen settings were tried on real crops. These had the highest F0.5 on training crops
+    left out, or an equal one with less spread over seeds. Fewer features per split, a quarter of
+    the leaves or a lower tower weight are worse; other changes within a factor of two are not.
     """
 
     trees: int = Field(200, ge=1, description="number of trees, each correcting the ones before")
@@ -61,10 +53,10 @@ class Trees(NamedTuple):
 
     Attributes:
         root: (T,) int32, first node of each tree.
-        feature: (N,) int32, feature that a node asks for; -1 in a leaf.
-        threshold: (N,) float64, to the left where the feature is at most this.
+        feature: (N,) int32, feature that a node splits on; -1 in a leaf.
+        threshold: (N,) float64; a row goes left where the feature is at most this.
         left, right: (N,) int32, child nodes; 0 in a leaf.
-        value: (N,) float64, what a leaf adds to the logarithm of the odds; 0 in other nodes.
+        value: (N,) float64, what a leaf adds to the log odds; 0 in other nodes.
     """
 
     root: np.ndarray
@@ -81,7 +73,7 @@ class BoostedTrees:
 
     Attributes:
         settings, seed: what it was trained with.
-        odds: logarithm of the odds that the trees begin with.
+        odds: log odds before the first tree.
         trees: the trees.
         tau: threshold; None before tuning.
         provenance: what made it.
@@ -95,7 +87,7 @@ class BoostedTrees:
     provenance: dict[str, Any]
 
     def of_occupied(self, sample: VoxelSample) -> np.ndarray:
-        """Probability of each occupied voxel to hold a tower, (M,) float32 in [0, 1]."""
+        """Probability that each occupied voxel is part of a tower, (M,) float32 in [0, 1]."""
         return self.of_features(voxel_features(sample))
 
     def of_features(self, features: np.ndarray) -> np.ndarray:
@@ -122,7 +114,9 @@ class BoostedTrees:
             InputError: it has not been tuned.
         """
         if self.tau is None:
-            raise InputError("the black box has no detection threshold", remedy="Tune it first")
+            raise InputError(
+                "the boosted trees have no detection threshold", remedy="Tune it first"
+            )
         return self.tau
 
 
@@ -164,8 +158,8 @@ def fit_and_tune(
 ) -> tuple[BoostedTrees, ThresholdCurve]:
     """Train on all crops and tune by leave-one-out over them, where none can be spared.
 
-    Trees know the voxels that they grew on, so tau must not be chosen there: each crop is
-    answered by trees grown on the others.
+    Trees memorise the voxels that they grew on, so tau must not be chosen there: each crop is
+    predicted by trees grown on the others.
 
     Returns:
         the tuned model, and the curve that tau was chosen on.
@@ -187,59 +181,6 @@ def fit_and_tune(
         curve += ThresholdCurve.of(*sample.spread(model.of_features(features[out])))
     model = _fit(features, towers, settings, seed, provenance)
     return replace(model, tau=curve.best()[0]), curve
-
-
-def write_black_box(path: str | Path, model: BoostedTrees) -> None:
-    """Write ``model`` to ``path`` (``.safetensors``)."""
-    from safetensors.numpy import save_file
-
-    if Path(path).suffix != ".safetensors":
-        raise ValueError(f"a black box is kept in *.safetensors, not {path}")
-    head = {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "kind": KIND,
-        "settings": model.settings.model_dump(),
-        "seed": model.seed,
-        "odds": model.odds,
-        "tau": model.tau,
-        "features": [feature.name for feature in FEATURES],
-        "provenance": model.provenance,
-    }
-    tensors = {name: np.ascontiguousarray(array) for name, array in model.trees._asdict().items()}
-    with atomic(path) as partial:
-        save_file(tensors, partial, metadata={"model": json.dumps(head, allow_nan=False)})
-
-
-def read_black_box(path: str | Path) -> BoostedTrees:
-    """Read a model back.
-
-    Raises:
-        InputError: there is no such file, or it is not a model file this version can read.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError("there is no such model file", file=path)
-    from safetensors import SafetensorError, safe_open
-
-    try:
-        with safe_open(path, framework="np") as stream:
-            head = json.loads((stream.metadata() or {})["model"])
-            _check_head(head)
-            trees = Trees(**{name: stream.get_tensor(name) for name in Trees._fields})
-        _check_trees(trees)
-        settings = BoostedTreesSettings(**head["settings"])
-        tau = None if head["tau"] is None else float(head["tau"])
-        odds, seed = float(head["odds"]), int(head["seed"])
-        return BoostedTrees(settings, seed, odds, trees, tau, dict(head["provenance"]))
-    except InputError as error:
-        raise InputError(error.problem, file=path, remedy=error.remedy) from None
-    except (SafetensorError, KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"not a readable black box ({type(error).__name__}: {error})",
-            file=path,
-            remedy="Name a .safetensors file that scenenet has written",
-        ) from None
 
 
 def _fit(
@@ -266,7 +207,7 @@ def _fit(
         min_samples_leaf=settings.leaf_voxels,
         l2_regularization=settings.l2,
         max_features=settings.feature_share,
-        early_stopping=False,  # it would keep voxels back that lie beside those trained on
+        early_stopping=False,  # it would hold out neighbours of the voxels that it trains on
         random_state=seed,
     )
     each = settings.tower_weight * (len(tower) - n_tower) / n_tower
@@ -278,7 +219,7 @@ def _fit(
 def _trees_of(grown: Any) -> Trees:
     """The trees of a fitted classifier.
 
-    scikit-learn offers no public way to them; the tests compare every answer with its own.
+    scikit-learn has no public access to them; the tests compare every probability with its own.
     """
     nodes = [predictor.nodes for (predictor,) in grown._predictors]
     root = np.cumsum([0, *(len(tree) for tree in nodes)])[:-1].astype(np.int32)
@@ -293,39 +234,6 @@ def _trees_of(grown: Any) -> Trees:
         np.where(leaf, 0, every["right"] + shift).astype(np.int32),
         np.where(leaf, every["value"], 0.0),
     )
-
-
-def _check_head(head: Any) -> None:
-    if not isinstance(head, dict) or head.get("format") != FORMAT:
-        raise InputError("not a black box of scenenet", remedy="Name a file that it has written")
-    if head["format_version"] != FORMAT_VERSION:
-        raise InputError(
-            f"black box of format {head['format_version']}, this version reads {FORMAT_VERSION}",
-            remedy="Use the version of scenenet that wrote it, or train it again",
-        )
-    if head["features"] != [feature.name for feature in FEATURES]:
-        raise InputError(
-            "the black box was trained on other features than this version works out",
-            remedy="Use the version of scenenet that wrote it, or train it again",
-        )
-
-
-def _check_trees(trees: Trees) -> None:
-    """Refuse trees that the compiled walk below would lose its way in."""
-    n = len(trees.feature)
-    node = np.arange(n)
-    split = trees.feature >= 0
-    sound = (
-        all(array.ndim == 1 for array in trees)
-        and all(len(array) == n for array in trees[1:])
-        and bool(((trees.root >= 0) & (trees.root < n)).all())
-        and bool((trees.feature < len(FEATURES)).all())
-        and all(
-            bool(((child > node) & (child < n))[split].all()) for child in (trees.left, trees.right)
-        )
-    )
-    if not sound:
-        raise ValueError("its trees are damaged")
 
 
 @numba.njit(cache=True)

@@ -21,10 +21,10 @@ def evaluate_boosted_trees(
     outs: Sequence[str | Path],
     out_times: str | Path,
 ) -> None:
-    """Train the black box from each seed, tune it on validation and score it on the test crops.
+    """Train the boosted trees from each seed, tune it on validation and score it on the test crops.
 
     Args:
-        outs: JSON file of each seed: what ``score_answers`` says, and ``parameters``.
+        outs: JSON file of each seed: what ``score_answers`` returns, and ``parameters``.
         out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels an edge
             (``scenenet.evaluation.inference_time``), ``peak_memory_mb`` of all of this.
     """

@@ -1,4 +1,4 @@
-"""What a person would look at in a voxel's surroundings, as numbers for a black box.
+"""Features of a voxel's surroundings for the boosted trees.
 
 A SCENE-Net sees a voxel through one kernel. A model that is to be a fair measure for it (thesis
 5.2.4.2) gets what is known to help with towers, worked out beforehand: how high above the ground a

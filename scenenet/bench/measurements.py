@@ -277,7 +277,6 @@ def machine() -> dict[str, Any]:
         else os.cpu_count(),
         "threads": numba.get_num_threads(),
         "torch_threads": torch.get_num_threads(),
-        "gpu": torch.cuda.get_device_name() if torch.cuda.is_available() else None,
         "python": platform.python_version(),
         "torch": torch.__version__,
         "numba": numba.__version__,

@@ -7,7 +7,7 @@ voxel adds the kernel, mirrored about its anchor, to the output around it. That 
     out[p] = sum_q kernel[q] * x[p + q - a],   a = (k - 1) // 2 on each axis
 
 with x = 0 outside the grid. An even kernel reaches one voxel further up each axis than down.
-``docs/method/performance.md`` explains its speed. A kernel on a GPU is convolved there, densely.
+``docs/method/performance.md`` explains its speed.
 """
 
 from __future__ import annotations
@@ -21,7 +21,6 @@ from scenenet.convolution.compiled.kernel_tables import kernel_of, lanes_of, tab
 from scenenet.convolution.compiled.options import TASKS, first_plane
 from scenenet.convolution.compiled.planes import gather_plane, layout, sum_plane
 from scenenet.convolution.compiled.runs import RUN
-from scenenet.convolution.dense import convolve_dense
 from scenenet.convolution.occupancy import Occupancy, Shape
 from scenenet.core.compilation import COMPILED
 
@@ -38,12 +37,10 @@ def convolve(occupancy: Occupancy, kernel: Tensor) -> Tensor:
             even.
 
     Returns:
-        (B, D, H, W), or (K, B, D, H, W), of the kernel's dtype and on its device.
+        (B, D, H, W), or (K, B, D, H, W), of the kernel's dtype.
     """
     if kernel.dim() == 4:
         return torch.stack([convolve(occupancy, one) for one in kernel])
-    if kernel.is_cuda:
-        return convolve_dense(occupancy, kernel)
     return _Convolution.apply(kernel, occupancy)
 
 
@@ -51,7 +48,7 @@ def convolve_at_voxels(occupancy: Occupancy, kernels: Tensor) -> Tensor:
     """What ``convolve`` answers at the occupied voxels, without a volume; no gradient.
 
     Args:
-        kernels: (K, kz, ky, kx), float32 or float64, on the CPU.
+        kernels: (K, kz, ky, kx), float32 or float64.
 
     Returns:
         (K, M), in the order of ``occupancy.index``.
@@ -84,7 +81,7 @@ def convolution_gradient(occupancy: Occupancy, upstream: Tensor, size: Shape) ->
     """Gradient of sum(upstream * convolve(occupancy, kernel)) with respect to the kernel.
 
     Args:
-        upstream: (B, D, H, W), float32 or float64, on the CPU.
+        upstream: (B, D, H, W), float32 or float64.
         size: (kz, ky, kx) of the kernel.
     """
     dense = np.ascontiguousarray(upstream.numpy())

@@ -5,8 +5,6 @@ voxel, an error against the truth, or counts at every threshold. Only the first 
 other two leave nothing behind but a few numbers, and the gradient of the error with respect to the
 kernel is gathered from each plane before the next one takes its place. Rows that no occupied voxel
 reaches all hold the same value, (tanh(bias))_+, and are dealt with by their number.
-
-A kernel on a GPU takes the dense way of torch in each of these functions.
 """
 
 from __future__ import annotations
@@ -23,7 +21,6 @@ from scenenet.convolution.compiled.kernel_tables import kernel_of, table_of
 from scenenet.convolution.compiled.options import TASKS, first_plane
 from scenenet.convolution.compiled.planes import gather_plane, layout, sum_plane
 from scenenet.convolution.convolve import convolution_gradient, table_shape
-from scenenet.convolution.dense import convolve_dense, squared_error_dense
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.compilation import COMPILED
 
@@ -40,8 +37,6 @@ def observe(occupancy: Occupancy, kernel: Tensor, bias: Tensor | None = None) ->
         (B, D, H, W) of the kernel's dtype, in [0, 1].
     """
     bias = kernel.new_zeros(()) if bias is None else bias
-    if kernel.is_cuda:
-        return torch.relu(torch.tanh(convolve_dense(occupancy, kernel) + bias))
     return _Observation.apply(kernel, bias, occupancy)
 
 
@@ -63,8 +58,6 @@ def squared_error(
         () of the kernel's dtype.
     """
     bias = kernel.new_zeros(()) if bias is None else bias
-    if kernel.is_cuda:
-        return squared_error_dense(observe(occupancy, kernel, bias), tower, weights)
     # Inside the function torch has switched gradients off, so it has to be told.
     learns = torch.is_grad_enabled() and (kernel.requires_grad or bias.requires_grad)
     return _SquaredError.apply(kernel, bias, occupancy, tower, weights, learns)
@@ -80,8 +73,7 @@ def count_reached(
     """How many voxels reach how many of the thresholds, without a volume.
 
     Args:
-        occupancy, kernel, bias, tower: as ``squared_error`` takes them; no gradient. The CPU does
-            the counting wherever the kernel is.
+        occupancy, kernel, bias, tower: as ``squared_error`` takes them; no gradient.
         thresholds: (S,) ascending, all above zero; compared in the kernel's dtype.
 
     Returns:
@@ -331,8 +323,8 @@ def _plane_starts(tower: np.ndarray, occupancy: Occupancy) -> np.ndarray:
 
 
 def _numpy(tensor: Tensor) -> np.ndarray:
-    return np.ascontiguousarray(tensor.detach().cpu().numpy())
+    return np.ascontiguousarray(tensor.detach().numpy())
 
 
 def _scalar(tensor: Tensor) -> Any:
-    return tensor.detach().cpu().numpy()[()]
+    return tensor.detach().numpy()[()]

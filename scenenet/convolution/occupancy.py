@@ -84,12 +84,12 @@ class Occupancy:
         grid = np.repeat(np.arange(len(self)), np.diff(self.offsets))
         return self.index + grid * int(np.prod(self.shape))
 
-    def dense(self, dtype: torch.dtype | None = None, device: torch.device | None = None) -> Tensor:
-        """(B, D, H, W) tensor of the same grids; of the values' type unless told."""
+    def dense(self, dtype: torch.dtype | None = None) -> Tensor:
+        """(B, D, H, W) tensor of the same grids, of the values' type if ``dtype`` is None."""
         values = np.ones(len(self.index), np.float32) if self.values is None else self.values
-        entries = torch.from_numpy(values).to(device, dtype)
-        volume = torch.zeros(self.n_voxels, dtype=entries.dtype, device=device)
-        volume[torch.from_numpy(self.flat()).to(device)] = entries
+        entries = torch.from_numpy(values).to(dtype)
+        volume = torch.zeros(self.n_voxels, dtype=entries.dtype)
+        volume[torch.from_numpy(self.flat())] = entries
         return volume.reshape(len(self), *self.shape)
 
 

@@ -1,4 +1,4 @@
-"""SCENE-Net, the CNN and the black box, trained on the same crops and scored on the same others.
+"""SCENE-Net, CNN and boosted trees, trained on the same crops and scored on the same others.
 
 Each chooses tau in its own way (docs/method/baselines.md): a SCENE-Net in metres on its training
 crops as well, the boosted trees never on those.
@@ -83,12 +83,12 @@ def train_and_tune(
     """Train and tune one model.
 
     Args:
-        settings: of the model; None for the black box.
+        settings: of the model; None for the boosted trees.
         validation: crops to choose tau on; without any it is chosen on the training crops, and
-            that of the black box by leaving out one of them at a time.
+            for the boosted trees it is chosen by leaving out one of them at a time.
 
     Raises:
-        InputError: there is no tower to learn from, or one crop alone for a black box.
+        InputError: there is no tower to learn from, or a single crop for boosted trees.
     """
     if settings is None:
         return train_boosted_trees(training, validation, seed)

@@ -86,12 +86,11 @@ class Lattice:
         cls,
         size: tuple[int, int, int],
         dtype: torch.dtype = torch.float32,
-        device: torch.device | None = None,
     ) -> Lattice:
         """The lattice of a kernel of ``size`` (kz, ky, kx), each at least 1."""
         if len(size) != 3 or min(size) < 1:
             raise ValueError(f"kernel size must be three positive integers, not {size}")
-        z, y, x = (torch.arange(k, dtype=dtype, device=device) - (k - 1) // 2 for k in size)
+        z, y, x = (torch.arange(k, dtype=dtype) - (k - 1) // 2 for k in size)
         planar = y[:, None] ** 2 + x[None, :] ** 2
         return cls(size, z[:, None, None], planar[None])
 
@@ -102,7 +101,6 @@ class Lattice:
         radius: float,
         voxel_size: float,
         dtype: torch.dtype = torch.float32,
-        device: torch.device | None = None,
     ) -> Lattice:
         """The same in metres, within ``radius`` of the vertical axis; a disc has no corners that
         would stand out when the scene is turned.
@@ -111,7 +109,7 @@ class Lattice:
             size: (kz, ky, kx), all odd.
             radius, voxel_size: m.
         """
-        voxels = cls.of_size(size, dtype, device)
+        voxels = cls.of_size(size, dtype)
         planar = voxels.planar_squared * voxel_size**2
         inside = (planar <= (radius * (1 + 1e-6)) ** 2).to(dtype)
         return cls(size, voxels.z * voxel_size, planar, inside)

@@ -106,9 +106,6 @@ class TrainingSettings(Settings):
         0.0, ge=0, lt=1, description="share that the learning rate loses every so often (5.3.4)"
     )
     decay_every: int = Field(10, ge=1, description="epochs from one such loss to the next")
-    device: Literal["cpu", "cuda"] = Field(
-        "cpu", description="where the steps are taken; cuda needs a GPU that torch can use"
-    )
     loss: LossSettings = LossSettings()
 
     @model_validator(mode="before")

@@ -55,8 +55,8 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
 
     Up to three rows per model tell which trainings were counted: ``all seeds``, ``live seeds``
     (those that detect anything; only where some do not) and the one that is best on validation,
-    which is the one that predicts. The thesis counts useful trainings only (5.2.6). The black box
-    (``scenenet.baselines.boosted_trees``) was trained, tuned and scored on the same crops.
+    which is the one that predicts. The thesis counts useful trainings only (5.2.6). The boosted
+    trees (``scenenet.baselines.boosted_trees``) were trained, tuned and scored on the same crops.
     ``voxels`` says which the model calls a tower's: those that reach tau, or those of whole towers
     (docs/method/detection.md).
     """

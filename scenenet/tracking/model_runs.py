@@ -28,7 +28,7 @@ def model_groups(
     pictures: Sequence[Picture] = (),
     study: str = "reproduction",
 ) -> list[RunGroup]:
-    """One parent per model, the black box among them, with a run per seed under it.
+    """One parent per model, the boosted trees among them, with a run per seed under it.
 
     Args:
         results: the result folder.

@@ -51,7 +51,7 @@ def cross_entropy(
     empty, at_tower = weights
     # Not "> 0", which what is not a number would pass by unseen.
     speaking = answers[~(answers <= 0)]
-    there = torch.relu(answers[torch.from_numpy(tower).to(answers.device)])
+    there = torch.relu(answers[torch.from_numpy(tower)])
     probability = torch.tanh(there.double()).clamp(min=LEAST)
     wrong = empty * (_no_tower(speaking).sum() - _no_tower(there).sum())
     return (wrong - at_tower * probability.log().sum()).to(kernel.dtype)

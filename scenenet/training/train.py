@@ -114,7 +114,7 @@ def fit(
         the model after the last epoch, and its history (see ``train``).
 
     Raises:
-        InputError: there is nothing to train on, or no GPU where one is asked for.
+        InputError: there is no tower voxel to train on.
         LostTraining: the numbers ran away; a lower learning rate may keep them.
     """
     if not any(sample.tower.any() for sample in training):
@@ -123,15 +123,10 @@ def fit(
             remedy="Add labelled crops, and check that their class scheme is the right one",
         )
     protocol = settings.training
-    if protocol.device == "cuda" and not torch.cuda.is_available():
-        raise InputError(
-            f"{settings.name} is to be trained on a GPU, and torch finds none",
-            remedy="Set training.device to cpu, or install a torch that knows the GPU",
-        )
     identity = _identity(training, validation, settings, seed)
     if settings.protocol == "operational" and settings.kind == "scenenet":
         return search_metric(training, validation, settings, seed, identity, checkpoint=checkpoint)
-    model = starting_model(settings, seed, training).to(protocol.device)
+    model = starting_model(settings, seed, training)
     optimiser = OPTIMISERS[protocol.optimiser](model.parameters(), lr=protocol.learning_rate)
     n_tower = sum(int(sample.tower.sum()) for sample in training)
     n_voxels = sum(sample.grid.n_voxels for sample in training)
@@ -157,7 +152,7 @@ def fit(
         history.append({"epoch": epoch} | row)
         if checkpoint is not None:
             _save(checkpoint, identity, model, optimiser, history)
-    return model.cpu(), pd.DataFrame(history)
+    return model, pd.DataFrame(history)
 
 
 def _epoch(

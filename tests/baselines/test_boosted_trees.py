@@ -1,8 +1,7 @@
-"""The black box: its trees, its threshold, its files."""
+"""Boosted trees: the trees and the threshold."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,10 +12,8 @@ from scenenet.baselines.boosted_trees import (
     BoostedTreesSettings,
     fit,
     fit_and_tune,
-    read_black_box,
     threshold_curve,
     tune,
-    write_black_box,
 )
 from scenenet.baselines.voxel_features import FEATURES, voxel_features
 from scenenet.core.errors import InputError
@@ -136,83 +133,6 @@ def test_learnt_numbers_are_those_of_splits_and_leaves(trained):
     leaves = int((model.trees.feature < 0).sum())
     splits = leaves - len(model.trees.root)  # a binary tree has one leaf more than splits
     assert model.n_parameters() == 2 * splits + leaves > 0
-
-
-def test_a_file_gives_the_same_model_back(tmp_path, trained, crops):
-    model, _ = trained
-    path = tmp_path / "b.safetensors"
-    write_black_box(path, model)
-    back = read_black_box(path)
-    assert (back.settings, back.seed, back.odds, back.tau, back.provenance) == (
-        model.settings, model.seed, model.odds, model.tau, {"why": "test"},
-    )  # fmt: skip
-    for one, other in zip(model.trees, back.trees, strict=True):
-        assert one.dtype == other.dtype
-        np.testing.assert_array_equal(one, other)
-    np.testing.assert_array_equal(back.of_occupied(crops[3]), model.of_occupied(crops[3]))
-    again = tmp_path / "again.safetensors"
-    write_black_box(again, back)
-    assert again.read_bytes() == path.read_bytes()
-
-
-def test_files_have_the_ending_of_their_format(tmp_path, trained):
-    with pytest.raises(ValueError, match=r"\.safetensors"):
-        write_black_box(tmp_path / "b.pkl", trained[0])
-
-
-def rewritten(path, trained, trees=None, **head):
-    """A file of the model with parts of it replaced."""
-    from safetensors import safe_open
-    from safetensors.numpy import save_file
-
-    write_black_box(path, replace(trained[0], trees=trained[0].trees._replace(**(trees or {}))))
-    with safe_open(path, framework="np") as stream:
-        known = json.loads(stream.metadata()["model"]) | head
-        tensors = {name: stream.get_tensor(name) for name in list(stream.keys())}
-    save_file(tensors, path, metadata={"model": json.dumps(known)})
-    return path
-
-
-@pytest.mark.parametrize(
-    ("head", "problem"),
-    [
-        ({"format": "other"}, "not a black box of scenenet"),
-        ({"format_version": 2}, "format 2"),
-        ({"features": ["height"]}, "other features"),
-        ({"settings": {"trees": 0}}, "not a readable black box"),
-        ({"odds": None}, "not a readable black box"),
-    ],
-)
-def test_other_files_are_refused(tmp_path, trained, head, problem):
-    path = rewritten(tmp_path / "b.safetensors", trained, **head)
-    with pytest.raises(InputError, match=problem) as caught:
-        read_black_box(path)
-    assert caught.value.file == str(path)
-
-
-def test_damaged_trees_are_refused(tmp_path, trained):
-    trees = trained[0].trees
-    n = len(trees.feature)
-    damages = [
-        {"left": np.zeros(n, np.int32)},  # a walk in circles
-        {"right": np.where(trees.feature >= 0, n, 0).astype(np.int32)},  # out of the arrays
-        {"feature": np.full(n, len(FEATURES), np.int32)},
-        {"root": np.array([-1], np.int32)},
-        {"value": trees.value[:-1]},
-    ]
-    for damage in damages:
-        path = rewritten(tmp_path / "b.safetensors", trained, trees=damage)
-        with pytest.raises(InputError, match="trees are damaged"):
-            read_black_box(path)
-
-
-def test_what_is_no_model_file_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no such model file"):
-        read_black_box(tmp_path / "none.safetensors")
-    other = tmp_path / "other.safetensors"
-    other.write_bytes(b"nothing of the kind")
-    with pytest.raises(InputError, match="not a readable black box"):
-        read_black_box(other)
 
 
 FOLDS = (("sample_575", "sample_578"), ("sample_584", "sample_588"), ("sample_591", "sample_593"))

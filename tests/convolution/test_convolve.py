@@ -6,11 +6,11 @@ import numba
 import numpy as np
 import pytest
 import torch
+from fixtures.dense import convolve_dense
 from hypothesis import given
 from hypothesis import strategies as st
 
 from scenenet.convolution.convolve import convolve, convolve_at_voxels
-from scenenet.convolution.dense import convolve_dense
 from scenenet.convolution.occupancy import Occupancy
 
 # torch says that an even size costs it a copy.
@@ -189,20 +189,3 @@ def test_the_answer_does_not_depend_on_the_number_of_cores():
     numba.set_num_threads(before)
     assert torch.equal(*answers)
     assert torch.equal(*gradients)
-
-
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU that torch can use")
-@given(shapes, sizes, st.integers(0, 99))
-def test_a_gpu_gives_the_same_answer_and_gradient(shape, size, seed):
-    occupancy = grids(shape, 2, 0.3, seed, np.float32)
-    results = []
-    for device in ("cpu", "cuda"):
-        kernel = torch.from_numpy(np.random.default_rng(seed).normal(size=size)).float().to(device)
-        kernel.requires_grad_()
-        answer = convolve(occupancy, kernel)
-        assert answer.device.type == device
-        answer.tanh().sum().backward()
-        results.append((answer.cpu(), kernel.grad.cpu()))
-    (here, there) = results
-    torch.testing.assert_close(here[0], there[0], rtol=1e-4, atol=1e-4)
-    torch.testing.assert_close(here[1], there[1], rtol=1e-3, atol=1e-3)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
+from fixtures.dense import convolve_dense, squared_error_dense
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenenet.convolution.dense import convolve_dense, squared_error_dense
 from scenenet.convolution.observer import count_reached, observe, squared_error
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
@@ -124,12 +124,3 @@ def test_a_single_precision_probability_is_as_near_as_its_type_allows():
     units = np.abs(got - expected) / np.spacing(np.maximum(expected, 1e-37).astype(np.float32))
     assert units.max() <= 3
     assert (got <= 1).all()
-
-
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU that torch can use")
-def test_a_gpu_gives_the_same_error():
-    occupancy, tower = scene((16, 16, 16), 3, 0.05, valued=False)
-    kernel, _ = numbers((5, 3, 3), None, 1, torch.float32)
-    here = squared_error(occupancy, kernel, None, tower, WEIGHTS)
-    there = squared_error(occupancy, kernel.detach().cuda(), None, tower, WEIGHTS)
-    torch.testing.assert_close(here.detach(), there.cpu(), rtol=1e-4, atol=1e-4)

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 import torch
+from fixtures.dense import convolve_dense
 from hypothesis import given
 from hypothesis import strategies as st
 from torch.nn.functional import binary_cross_entropy
 
-from scenenet.convolution.dense import convolve_dense
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.training.cross_entropy import LEAST, cross_entropy
 
@@ -90,12 +90,3 @@ def test_what_is_not_a_number_makes_an_error_that_is_none():
     kernel = torch.full((3, 3, 3), float("nan"))
     assert torch.isnan(cross_entropy(occupancy, kernel, None, tower, WEIGHTS))
     assert torch.isnan(cross_entropy(occupancy, kernel, None, tower[:0], WEIGHTS))
-
-
-@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no GPU that torch can use")
-def test_a_gpu_gives_the_same():
-    occupancy, tower = scene(3, 0.3)
-    kernel, _ = numbers(1, None, torch.float32)
-    here = cross_entropy(occupancy, kernel, None, tower, WEIGHTS)
-    there = cross_entropy(occupancy, kernel.detach().cuda(), None, tower, WEIGHTS)
-    torch.testing.assert_close(here.detach(), there.cpu(), rtol=1e-4, atol=1e-4)

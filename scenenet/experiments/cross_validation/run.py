@@ -45,7 +45,7 @@ def cross_validate(
 
     Args:
         voxel_manifests: of the voxel stores.
-        model: what is trained; None for the black box.
+        model: what is trained; None for the boosted trees.
         leave_out, neighbour: as ``scenenet.dataset.folds``.
         detection: what makes a tower; the same for every model.
         out: CSV file, columns ``COLUMNS``; ``training_f05`` is on the crops that tau was chosen on.

@@ -15,5 +15,5 @@ class CrossValidationSettings(Settings):
         0, ge=0, description="crops left out at a time, in the order of their names; 0 for none"
     )
     contenders: tuple[Contender, ...] = Field(
-        (), description="models that take part beside the black box; none for every model"
+        (), description="models that take part beside the boosted trees; none for every model"
     )

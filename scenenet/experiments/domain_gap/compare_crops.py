@@ -163,7 +163,7 @@ def tell_apart(real: pd.DataFrame, synthetic: pd.DataFrame) -> Apart:
 
 
 def tell_voxels_apart(real: Measured, synthetic: Measured) -> tuple[Apart, Apart]:
-    """Tell apart by the voxel features of the black box; whole crops are kept out of training.
+    """Tell apart by the voxel features of the boosted trees; whole crops are kept out of training.
 
     Returns:
         for single voxels, and for crops by the mean answer to their voxels.

@@ -2,8 +2,8 @@
 
     python -m scenenet.experiments.domain_gap.transfer --real FOLDER_OF_TS40K_SAMPLES
 
-trains SCENE-Net and the black box on synthetic crops alone and scores them on real ones, beside the
-same models trained on real crops with two left out at a time. Prints the table of
+trains SCENE-Net and the boosted trees on synthetic crops alone and scores them on real ones, beside
+the same models trained on real crops with two left out at a time. Prints the table of
 docs/method/synthetic.md.
 """
 

@@ -81,7 +81,7 @@ def run_noise(
     ``LABELS`` says at each level how good the labels are.
 
     Args:
-        models: those that take part beside the black box.
+        models: those that take part beside the boosted trees.
         out: CSV file, columns ``COLUMNS``.
 
     Returns:

@@ -43,7 +43,7 @@ class NoiseSettings(Settings):
         "rest of the line is tested on",
     )
     contenders: tuple[Contender, ...] = Field(
-        (), description="models that take part beside the black box; none for every model"
+        (), description="models that take part beside the boosted trees; none for every model"
     )
 
     @model_validator(mode="after")

@@ -118,7 +118,7 @@ def training(material: Material) -> Section | None:
             "voxel, median over crops and repeats; making voxels of points is not in it. “Until "
             "one detects anything” is the time of a training over the share of them that do. "
             "Peak memory is the largest resident set of a training process, Python, its libraries "
-            "and the crops included (of the black box: of training and scoring every seed)."
+            "and the crops included (of the boosted trees: of training and scoring every seed)."
         )
         blocks = [table(frame, columns, caption, "tables/times.csv"), *blocks]
     return Section("training", "Training", blocks) if blocks else None

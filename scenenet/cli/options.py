@@ -4,64 +4,85 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
+from scenenet.dataset import voxels
+from scenenet.models import settings
 from scenenet.pointcloud.class_schemes import SCHEMES, difference
 
-Codes = StrEnum("Codes", {name: name for name in SCHEMES})  # type: ignore[misc]
-"""Class schemes; see ``scenenet.pointcloud.class_schemes``."""
+if TYPE_CHECKING:
+    from scenenet.dataset.voxels import VoxelSettings
+    from scenenet.detection.settings import DetectionSettings
+
+_KINDS = get_args(settings.ModelSettings.model_fields["kind"].annotation)
+_RESOLUTIONS = get_args(voxels.VoxelSettings.model_fields["resolution"].annotation)
 
 
-class Fit(StrEnum):
-    """Grids; see ``scenenet.dataset.voxels``."""
-
-    cube = "cube"
-    metric = "metric"
+def _choices(name: str, values: Any) -> Any:
+    return StrEnum(name, {value: value for value in values})
 
 
-class TrainedBy(StrEnum):
-    """Protocols; see ``scenenet.models.settings``."""
+Codes = _choices("Codes", SCHEMES)
+"""Class schemes (``scenenet.pointcloud.class_schemes``)."""
+Fits = _choices("Fits", get_args(voxels.Fit))
+"""Ways to lay the grid (``scenenet.dataset.voxels``)."""
+Protocols = _choices("Protocols", get_args(settings.Protocol))
+"""Training protocols (``scenenet.models.settings``)."""
+Kinds = _choices("Kinds", _KINDS)
+"""Architectures (``scenenet.models.settings``)."""
 
-    operational = "operational"
-    thesis = "thesis"
-
-
-class Kind(StrEnum):
-    """Architectures; see ``scenenet.models.scenenet``."""
-
-    scenenet = "scenenet"
-    cnn = "cnn"
-
-
+Survey = Annotated[Path, typer.Argument(help="LAS, LAZ or COPC survey, or TS40K sample.")]
 Surveys = Annotated[
-    list[Path], typer.Argument(help="LAS, LAZ or COPC surveys, TS40K .npy or .pt samples.")
+    list[Path], typer.Argument(help="LAS, LAZ or COPC surveys, or TS40K samples (.npy, .pt).")
 ]
-
-
 Labelled = Annotated[
     list[Path],
     typer.Argument(
-        help="Labelled surveys (LAS, LAZ, COPC), TS40K .npy or .pt samples, folders of samples."
+        help="Labelled surveys (LAS, LAZ, COPC), TS40K samples (.npy, .pt), or folders of samples."
     ),
 ]
-
-
-ModelFile = Annotated[Path, typer.Option("--model", help="Model file (.json or .safetensors).")]
-
-
-LabelCodes = Annotated[
-    Codes,
-    typer.Option("--codes", help=f"Class scheme of the labels ({difference()})."),
+ModelFile = Annotated[
+    Path,
+    typer.Option("--model", help="Model file that scenenet train wrote (.json, .safetensors)."),
 ]
-
-
-MinWire = Annotated[
+LabelCodes = Annotated[
+    Codes, typer.Option("--codes", help=f"Class scheme of the labels ({difference()}).")
+]
+MinConductor = Annotated[
     float | None,
     typer.Option(
         min=0,
-        help="How far wires must be followed from a tower, as a part of the way from 3 to 20 m off "
-        "it; 0.75 if not given, 0 for towers that carry none.",
+        help="Length of conductor that a tower must have, all directions together. The unit is "
+        "the stretch from 3 m to 20 m off its axis. 0 accepts towers without conductors.  "
+        "[default: 0.75]",
     ),
 ]
+Resolution = Annotated[
+    int,
+    typer.Option(
+        help=f"Voxels along each edge of a crop: {', '.join(map(str, _RESOLUTIONS))}.",
+    ),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
+
+
+def cube(resolution: int) -> VoxelSettings:
+    """The grid of the thesis with ``resolution`` voxels along each edge.
+
+    Raises:
+        typer.BadParameter: there is no such resolution.
+    """
+    if resolution not in _RESOLUTIONS:
+        known = ", ".join(map(str, _RESOLUTIONS))
+        raise typer.BadParameter(f"must be one of {known}", param_hint="--resolution")
+    return voxels.VoxelSettings(fit="cube", resolution=resolution)
+
+
+def detection_settings(min_conductor: float | None) -> DetectionSettings:
+    """The default settings of the detection, but for ``--min-conductor`` where it is given."""
+    from scenenet.detection.settings import DetectionSettings
+
+    given = {} if min_conductor is None else {"min_conductor": min_conductor}
+    return DetectionSettings(**given)

@@ -1,4 +1,4 @@
-"""What the commands print: JSON for programs, tables for people."""
+"""The output of the commands: JSON for programs, tables for people."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from collections.abc import Callable
 from typing import Any
 
 
-def _answer(data: Any, as_json: bool, lines: Callable[[Any], list[str]]) -> None:
+def show(data: Any, as_json: bool, lines: Callable[[Any], list[str]]) -> None:
+    """Print ``data`` as JSON, or as the ``lines`` for people."""
     print(json.dumps(data, indent=2) if as_json else "\n".join(lines(data)))
 
 
-def _training_lines(result: dict[str, Any]) -> list[str]:
+def training_lines(result: dict[str, Any]) -> list[str]:
     scores, crops = result["scores"], result["crops"]
     lines = [
         f"{result['model']}: the best of {len(result['seeds'])} seeds (seed {result['seed']}), "
@@ -20,10 +21,10 @@ def _training_lines(result: dict[str, Any]) -> list[str]:
         f"on the {result['tuned_on']} crops: P {scores['precision']:.2f} "
         f"R {scores['recall']:.2f} F0.5 {scores['f05']:.3f} tower IoU {scores['iou_tower']:.3f}",
     ]
-    return lines + [f"left out: {s['sample']}: {s['reason']}" for s in result["skipped"]]
+    return lines + [f"skipped: {s['sample']}: {s['reason']}" for s in result["skipped"]]
 
 
-def _score_lines(result: dict[str, Any]) -> list[str]:
+def score_lines(result: dict[str, Any]) -> list[str]:
     def row(name: str, scores: dict[str, float]) -> str:
         return f"{name:<24}" + "".join(
             f"{scores[key]:>10.3f}" for key in ("precision", "recall", "f05", "iou_tower", "miou")
@@ -35,7 +36,7 @@ def _score_lines(result: dict[str, Any]) -> list[str]:
         f"{'':<24}" + "".join(f"{n:>10}" for n in ("P", "R", "F0.5", "tower IoU", "macro IoU")),
         row(result["model"], result["voxel"]),
         row("  occupied voxels only", result["voxel_occupied"]),
-        row("  voxels that reach tau", result["voxel_observer"]),
+        row("  voxels at or above tau", result["voxel_observer"]),
         row("  whole towers", result["voxel_towers"]),
         row("predicting nothing", result["voxel_trivial"]),
         f"{result['voxel']['n_samples']} crops, tau {result['voxel']['tau']:.3f}",

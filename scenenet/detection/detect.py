@@ -214,7 +214,7 @@ def _measure(
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
     spans = leaving_spans(around, (x, y), body.base, body.height, crossarm, size)
     followed = sum(span.followed for span in spans)
-    if followed < settings.min_wire * (1 if peak >= tau else 2):
+    if followed < settings.min_conductor * (1 if peak >= tau else 2):
         return None
     return DetectedTower(
         x, y, body.base, body.height, width, free, body.upright, tuple(spans), peak, seen

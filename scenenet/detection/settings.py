@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from scenenet.core.settings import Settings
 
 
 class DetectionSettings(Settings):
-    """What makes a tower of detected voxels."""
+    """How towers are found in the probabilities of voxels (docs/method/detection.md)."""
 
     look: float = Field(
         0.5,
         gt=0,
         le=1,
-        description="of the observer's answer at tau; a tower is looked for where the answer is "
-        "this strong. Where it does not reach tau, a tower must have wires towards two sides and "
-        "stand free",
+        description="share of the observer's value at tau from which voxels are detected. A tower "
+        "whose voxels all stay below tau needs twice `min_conductor` and `min_free`",
     )
     eps: float = Field(
         6.0,
@@ -26,7 +27,7 @@ class DetectionSettings(Settings):
         description="m, planar; detected voxels nearer than this to an axis belong to it",
     )
     min_voxels: int = Field(
-        3, ge=1, description="detected voxels that must stand above one another on an axis"
+        3, ge=1, description="smallest number of detected voxels above one another on an axis"
     )
     min_body: float = Field(
         3.0,
@@ -35,51 +36,59 @@ class DetectionSettings(Settings):
         "tower is detected along its body, a treetop or a roof at one place",
     )
     min_height: float = Field(
-        9.0, ge=0, description="m; thesis 5.1.2 has towers from 18 m, wooden poles begin at 9 m"
+        9.0, ge=0, description="m; thesis 5.1.2 has towers from 18 m, wooden poles start at 9 m"
     )
     foot_radius: float = Field(
-        5.0, gt=0, description="m, around the tower, where the ground at its foot is looked for"
+        5.0, gt=0, description="m around the axis; the ground at the foot is measured there"
     )
     min_upright: float = Field(
         0.75,
         ge=0,
         le=1,
-        description="share of the levels from foot to top at which something must stand: a tower "
-        "goes all the way down, wires above one another do not",
+        description="smallest share of the levels from foot to top with an occupied voxel: the "
+        "body of a tower reaches the ground, conductors above one another do not",
     )
     crossarm: float = Field(
         0.25,
         gt=0,
         le=1,
-        description="of the height; conductors hang at most this far beside the axis",
+        description="of the height; largest distance of a conductor from the axis",
     )
-    min_wire: float = Field(
+    min_conductor: float = Field(
         0.75,
         ge=0,
-        description="of the way from 3 to 20 m off the axis, or to the edge of the data, that "
-        "wires must be followed from the head, all directions together; 0 to ask for none. Trees, "
-        "cranes, lone poles and roofs have none. Twice as much where tau is not reached",
+        description="length of conductor that leaves the head, all directions together, as a "
+        "share of the stretch from 3 to 20 m off the axis, or to the edge of the data; 0 accepts "
+        "towers without conductors. Trees, cranes, lone poles and roofs have none. Twice as much "
+        "is needed below tau",
     )
     min_free: float = Field(
         0.5,
         ge=0,
         le=1,
-        description="share of the body at which nothing may touch it where tau is not reached: a "
-        "tree under a line has its crown",
+        description="smallest share of the body that nothing touches, below tau: a tree under a "
+        "line has its crown",
     )
     body: float = Field(
         2.1,
         gt=0,
-        description="m about the axis, half the mean width of a tower (thesis 5.1.2): whatever "
-        "stands there is the tower, detected or not",
+        description="m about the axis, half the mean width of a tower (thesis 5.1.2): every "
+        "occupied voxel there belongs to the tower, detected or not",
     )
     beside_body: float = Field(
-        1.0, ge=0, description="m that this goes beyond half the measured width of a wider tower"
+        1.0, ge=0, description="m added to half the measured width, for a wider tower"
     )
     foot: float = Field(
-        1.0, ge=0, description="m above the ground; below are the ground and what grows on it"
+        1.0, ge=0, description="m above the ground; voxels below are ground and plants"
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _old_names(cls, raw: Any) -> Any:
+        if isinstance(raw, Mapping) and "min_wire" in raw:
+            raise ValueError("min_wire is now called min_conductor; write min_conductor: instead")
+        return raw
+
     def threshold(self, tau: float) -> float:
-        """Probability from which voxels are looked at, where tau makes one a tower's."""
+        """Probability from which voxels count as detected, for a model with threshold ``tau``."""
         return tau if tau >= 1 else math.tanh(self.look * math.atanh(tau))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -12,7 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import typer
 
+from scenenet.cli.app import COMMANDS, app
 from scenenet.cli.options import Codes
 from scenenet.pointcloud import SCHEMES
 
@@ -62,11 +65,29 @@ def test_the_protocol_of_the_thesis_can_be_asked_for(survey, tmp_path):
     assert json.loads(out.read_text())["units"] == "voxel"
 
 
-def test_every_command_explains_itself():
-    for command in ("check", "synth", "train", "predict", "evaluate", "explain"):
-        shown = scenenet(command, "--help")
-        assert shown.returncode == 0
-        assert "Options:" in shown.stdout and "--json" in shown.stdout
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_help_of_every_command_has_an_example(command):
+    shown = scenenet(command, "--help")
+    assert shown.returncode == 0
+    assert "Options:" in shown.stdout and "--json" in shown.stdout
+    assert re.search(rf"Examples?:\n+  scenenet {command} ", shown.stdout)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_example_is_a_valid_call(command):
+    """Its options exist: the call fails because of its files, if at all, and not with code 2."""
+    group = typer.main.get_command(app)
+    for example in COMMANDS[command].EXAMPLES:
+        arguments = shlex.split(example.partition(" >")[0])
+        assert arguments[:2] == ["scenenet", command]
+        group.commands[command].make_context(command, arguments[2:])
+
+
+@pytest.mark.parametrize("option", ["--epochs", "--learning-rate"])
+def test_options_of_the_gradient_are_refused_for_a_searched_model(tmp_path, option):
+    done = scenenet("train", "a.laz", "--codes", "edp", "--out", tmp_path / "m.json", option, 1)
+    assert done.returncode == 2
+    assert option in done.stderr and "search" in done.stderr
 
 
 def test_a_synthetic_survey_has_as_many_points_as_its_truth(survey):
@@ -113,21 +134,21 @@ def test_evaluate_at_the_models_voxel_size_looks_through_the_whole_survey(survey
 
 
 @pytest.mark.parametrize("command", ["predict", "evaluate", "explain"])
-def test_towers_without_wires_can_be_asked_for(command, model, tmp_path):
+def test_towers_without_conductors_can_be_accepted(command, model, tmp_path):
     shown = scenenet(command, "--help")
-    assert "--min-wire" in shown.stdout
-    refused = scenenet(command, "nowhere.laz", "--model", model, "--min-wire", "-1")
+    assert "--min-conductor" in shown.stdout
+    refused = scenenet(command, "nowhere.laz", "--model", model, "--min-conductor", "-1")
     assert refused.returncode == 2
-    assert "--min-wire" in refused.stderr
+    assert "--min-conductor" in refused.stderr
 
 
-def test_what_is_asked_of_wires_is_written_down(survey, model, tmp_path):
+def test_the_required_conductor_length_is_in_the_summary(survey, model, tmp_path):
     done = scenenet(
-        "predict", survey, "--model", model, "--out", tmp_path, "--min-wire", 0, "--json"
+        "predict", survey, "--model", model, "--out", tmp_path, "--min-conductor", 0, "--json"
     )
     assert done.returncode == 0, done.stderr
     [summary] = json.loads(done.stdout)
-    assert summary["settings"]["detection"]["min_wire"] == 0
+    assert summary["settings"]["detection"]["min_conductor"] == 0
 
 
 def test_explain_writes_a_page_that_needs_no_other_file(survey, model, tmp_path):

@@ -62,7 +62,7 @@ def test_wires_make_the_tower(lattice, pole, bearings):
     around, body = pole(bearings=bearings)
     found = detect(upper(body), lattice.together(lattice.ground(), around))
     assert [len(t.spans) for t in found] == ([len(bearings)] if bearings else [])
-    lone = detect(upper(body), lattice.together(lattice.ground(), around), min_wire=0)
+    lone = detect(upper(body), lattice.together(lattice.ground(), around), min_conductor=0)
     assert len(lone) == 1
 
 

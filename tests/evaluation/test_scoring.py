@@ -22,7 +22,7 @@ from scenenet.models.settings import MetricSettings, ModelSettings
 
 SHAPE = (12, 3, 30)
 GRID = VoxelGrid((0.0, 0.0, 0.0), 1.0, SHAPE)
-LONE_POLES = DetectionSettings(min_wire=0)
+LONE_POLES = DetectionSettings(min_conductor=0)
 """For scenes of poles without wires."""
 CARD = ModelCard(
     name="mock", codes="edp", measurement="presence", fit="metric", resolution=64, voxel_size=1.0,

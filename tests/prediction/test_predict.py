@@ -27,7 +27,7 @@ from scenenet.training.tuning import choose
 
 POLE = (500_020.5, 4_630_031.5)
 DUTCH_TOWER_HEIGHT_M = 42.0
-LONE_POLES = DetectionSettings(min_wire=0)
+LONE_POLES = DetectionSettings(min_conductor=0)
 """For scenes of poles without wires."""
 ADDED = {
     "tower_probability": np.float32,

@@ -1,0 +1,59 @@
+"""``scenenet evaluate``."""
+
+from __future__ import annotations
+
+import sys
+from typing import Annotated
+
+import typer
+
+from scenenet.cli.options import (
+    AsJson,
+    Fits,
+    LabelCodes,
+    Labelled,
+    MinConductor,
+    ModelFile,
+    Resolution,
+    cube,
+    detection_settings,
+)
+from scenenet.cli.output import score_lines, show
+
+EXAMPLES = (
+    "scenenet evaluate labelled.laz --model model.json --codes edp",
+    "scenenet evaluate labelled.laz --model model.json --codes asprs --fit metric",
+)
+
+GRID_OF_THE_THESIS = Fits("cube")
+
+
+def command(
+    labelled: Labelled,
+    model: ModelFile,
+    codes: LabelCodes,
+    fit: Annotated[
+        Fits,
+        typer.Option(
+            help="cube: a grid over the bounding cube of each crop, as in the thesis. metric: the "
+            "voxel size of the model; towers are searched for in whole surveys."
+        ),
+    ] = GRID_OF_THE_THESIS,
+    resolution: Resolution = 64,
+    min_conductor: MinConductor = None,
+    as_json: AsJson = False,
+) -> None:
+    """Score a model on labelled surveys or crops.
+
+    The voxel scores are precision, recall, F0.5 and IoU at the threshold tau of the model.
+
+    A predicted tower within 5 m of a labelled one is a true positive.
+    """
+    from scenenet.cli.labelled_files import evaluate_files
+
+    grid = cube(resolution) if fit.value == "cube" else None
+    detection = detection_settings(min_conductor)
+    result = evaluate_files(labelled, model, codes.value, grid, detection)
+    for skipped in result["skipped"]:
+        print(f"not scored: {skipped['sample']}: {skipped['reason']}", file=sys.stderr)
+    show(result, as_json, score_lines)

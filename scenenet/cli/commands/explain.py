@@ -1,0 +1,42 @@
+"""``scenenet explain``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenenet.cli.options import AsJson, MinConductor, ModelFile, Survey, detection_settings
+from scenenet.cli.output import show
+
+EXAMPLES = ("scenenet explain line.laz --model model.json --out towers.html",)
+
+
+def command(
+    survey: Survey,
+    model: ModelFile,
+    out: Annotated[Path, typer.Option("--out", help="Page to write (.html).")],
+    min_conductor: MinConductor = None,
+    as_json: AsJson = False,
+) -> None:
+    """Write a page that explains every tower of a survey.
+
+    Each tower has its measurements, the share of each GENEO, reasons to check it, and a picture.
+
+    The page needs no other file and no network.
+    """
+    from scenenet.core.extras import require
+    from scenenet.prediction.settings import PredictSettings
+
+    require("report", "scenenet explain")  # before the prediction, which takes minutes
+    from scenenet.report.explanation_page import explain_survey
+
+    detection = detection_settings(min_conductor)
+    found = explain_survey(survey, model, out, PredictSettings(), detection)
+    show(
+        [asdict(explanation) for explanation in found],
+        as_json,
+        lambda all_: [f"{out}: {len(all_)} towers explained"],
+    )

@@ -1,0 +1,115 @@
+"""``scenenet train``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from scenenet.cli.options import (
+    AsJson,
+    Kinds,
+    LabelCodes,
+    Labelled,
+    Protocols,
+    Resolution,
+    cube,
+)
+from scenenet.cli.output import show, training_lines
+from scenenet.training import presets
+
+EXAMPLES = (
+    "scenenet train line.laz --codes edp --out model.json",
+    "scenenet train crops/ --codes edp --kind cnn --out cnn.safetensors",
+)
+
+DEFAULT_KIND = Kinds("scenenet")
+DEFAULT_PROTOCOL = Protocols("operational")
+
+
+def command(
+    labelled: Labelled,
+    codes: LabelCodes,
+    out: Annotated[
+        Path, typer.Option("--out", help="Model file to write: .json, or .safetensors for a CNN.")
+    ],
+    kind: Annotated[Kinds, typer.Option(help="Architecture.")] = DEFAULT_KIND,
+    protocol: Annotated[
+        Protocols,
+        typer.Option(
+            help="operational: a SCENE-Net with kernels in metres, fitted by a search, or a CNN "
+            "that starts from Fisher's discriminant. thesis: kernels in voxels, trained by "
+            "gradient from a random start."
+        ),
+    ] = DEFAULT_PROTOCOL,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Number of models to train. The best one is written.")
+    ] = 5,
+    epochs: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Passes over the crops. Not for an operational SCENE-Net, which is fitted by a "
+            f"search.  [default: {presets.EPOCHS}]",
+        ),
+    ] = None,
+    learning_rate: Annotated[
+        float | None,
+        typer.Option(
+            min=1e-6,
+            help="Step size of RMSProp. Not for an operational SCENE-Net.  [default: "
+            f"{presets.LEARNING_RATES['operational']:g} for an operational CNN, "
+            f"{presets.LEARNING_RATES['thesis']:g} for protocol thesis]",
+        ),
+    ] = None,
+    resolution: Resolution = 64,
+    validation: Annotated[
+        float | None,
+        typer.Option(
+            min=0,
+            max=0.9,
+            help="Share of the crops kept to choose the threshold tau on.  [default: 0 for an "
+            "operational SCENE-Net, whose eleven parameters hardly overfit; "
+            f"{presets.VALIDATION_SHARE:g} for other models]",
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Train a model on labelled surveys or crops.
+
+    Surveys are cut into crops around their labelled towers.
+
+    Each seed gives a model. Its threshold tau is chosen by F0.5, and the model with the best F0.5
+    is written to --out.
+    """
+    from scenenet.cli.labelled_files import train_files
+    from scenenet.core.files import digest
+    from scenenet.core.provenance import package_version
+
+    ending = ".json" if kind.value == "scenenet" else ".safetensors"
+    if out.suffix != ending:
+        raise typer.BadParameter(f"a {kind} is written to a {ending} file", param_hint="--out")
+    try:
+        settings = presets.preset(kind.value, protocol.value, epochs, learning_rate)
+    except ValueError as error:
+        option = "--learning-rate" if epochs is None else "--epochs"
+        raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None
+    if validation is None:
+        validation = presets.validation_share(kind.value, protocol.value)
+    result = train_files(
+        labelled,
+        codes.value,
+        cube(resolution),
+        settings,
+        presets.TUNING,
+        range(seeds),
+        validation,
+        {
+            "config": digest(settings.model_dump()),
+            "version": package_version(),
+            "files": [path.name for path in labelled],
+        },
+        out,
+    )
+    show(result, as_json, training_lines)

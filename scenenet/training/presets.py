@@ -1,0 +1,55 @@
+"""Settings of a model that is trained without a configuration, as ``scenenet train`` does."""
+
+from __future__ import annotations
+
+from scenenet.models.settings import ModelSettings, Protocol, TrainingSettings, TuningSettings
+
+EPOCHS = 150
+"""Passes over the crops for training by gradient."""
+
+LEARNING_RATES: dict[Protocol, float] = {"thesis": 0.01, "operational": 0.001}
+"""Step size of RMSProp. The CNN of the operational protocol starts near its optimum, from Fisher's
+discriminant; larger steps lead away from it."""
+
+VALIDATION_SHARE = 0.3
+"""Share of the crops that is kept to choose tau and the kernel size on."""
+
+TUNING = TuningSettings(kernel_sizes=((9, 7, 7), (9, 5, 5), (13, 7, 7)))
+"""Kernel sizes that the crops of the thesis favour, besides that of the training."""
+
+
+def is_searched(kind: str, protocol: str) -> bool:
+    """Whether the model is fitted by a search: it then has no epochs and no learning rate."""
+    return kind == "scenenet" and protocol == "operational"
+
+
+def preset(
+    kind: str, protocol: Protocol, epochs: int | None = None, learning_rate: float | None = None
+) -> ModelSettings:
+    """The settings of a model of ``kind`` trained by ``protocol``.
+
+    Args:
+        epochs, learning_rate: of training by gradient; None for ``EPOCHS`` and ``LEARNING_RATES``.
+
+    Raises:
+        ValueError: one of them is given for a model that is fitted by a search.
+    """
+    if is_searched(kind, protocol):
+        if epochs is not None or learning_rate is not None:
+            raise ValueError("a search has no epochs and no learning rate")
+        return ModelSettings(name=kind, kind=kind, protocol=protocol)
+    training = TrainingSettings(
+        init="informed" if protocol == "operational" else "thesis",
+        epochs=epochs or EPOCHS,
+        learning_rate=learning_rate or LEARNING_RATES[protocol],
+    )
+    return ModelSettings(name=kind, kind=kind, protocol=protocol, training=training)
+
+
+def validation_share(kind: str, protocol: str) -> float:
+    """Share of the crops that is kept for tuning.
+
+    It is 0 for a model that is fitted by a search: with eleven parameters it hardly overfits its
+    crops, and learns from all of them.
+    """
+    return 0.0 if is_searched(kind, protocol) else VALIDATION_SHARE

@@ -124,11 +124,18 @@ class GeneoKernel(ABC):
     """A family of kernels g: R^3 -> R with shape parameters (thesis 4.4).
 
     To add one, put a file with a subclass into ``scenenet/geneo/kernels`` and decorate it with
-    ``scenenet.geneo.register``; nothing else has to know of it.
+    ``scenenet.geneo.register``; no other file changes.
+
+    Attributes:
+        name: in settings, model files and tables.
+        parameters: the shape parameters, in the order of tables.
+        sums_to_zero: whether every horizontal slice is meant to sum to zero (thesis 4.4.1); the
+            certificate of a model verifies it.
     """
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[ShapeParameter, ...]]
+    sums_to_zero: ClassVar[bool] = False
 
     @abstractmethod
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:

@@ -44,7 +44,7 @@ def certificate(model: str | Path) -> dict[str, Any]:
         1.0,
         # Between presences the property holds for any kernel, and no number goes with it.
         found.measured_model if found.measurement == "density" else None,
-        max((k.slice_sum for k in found.kernels if _balanced(k.name)), default=None),
+        max((k.slice_sum for k in found.kernels if k.sums_to_zero), default=None),
         found.weight_sum,
     )
     statements = [
@@ -60,10 +60,6 @@ def certificate(model: str | Path) -> dict[str, Any]:
         **found.as_dict(),
         "statements": statements,
     }
-
-
-def _balanced(kernel: str) -> bool:
-    return kernel.startswith(("cylinder", "arrow"))
 
 
 def _asked_of_any(statement: Statement) -> bool:

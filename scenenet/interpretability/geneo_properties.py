@@ -43,6 +43,7 @@ import numpy as np
 import torch
 
 from scenenet.dataset.voxels import Measurement
+from scenenet.geneo import kernel_named
 from scenenet.interpretability.equivariance import (
     Scene,
     Turn,
@@ -52,6 +53,7 @@ from scenenet.interpretability.equivariance import (
     turns_of,
 )
 from scenenet.interpretability.nonexpansivity import random_pairs, worst_pair, worst_pair_of_model
+from scenenet.models.geneo_model import GeneoModel
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
@@ -73,8 +75,9 @@ class Kernel:
         weight: lambda, its mixing weight.
         l1: ||g||_1, its non-expansivity constant.
         largest: max |g|.
-        total: sum of g; zero for cylinder and arrow (thesis 4.4.1, 4.4.2).
+        total: sum of g.
         slice_sum: the largest |sum| of a horizontal slice.
+        sums_to_zero: whether each slice is meant to sum to zero (thesis 4.4.1, 4.4.2).
         share: its weight among normalised kernels, lambda ||g||_1 over the sum of these.
     """
 
@@ -84,6 +87,7 @@ class Kernel:
     largest: float
     total: float
     slice_sum: float
+    sums_to_zero: bool
     share: float
 
 
@@ -251,11 +255,9 @@ class Certificate:
         balanced = [k.name for k in self.kernels if k.slice_sum <= ROUNDING * max(k.l1, 1)]
         others = [f"{k.name} {k.total:.3g}" for k in self.kernels if k.name not in balanced]
         return Statement(
-            "cylinder and arrow sum to zero",
+            "zero-sum kernels sum to zero",
             "4.4.1, 4.4.2",
-            all(
-                k.name in balanced for k in self.kernels if k.name.startswith(("cylinder", "arrow"))
-            ),
+            all(k.name in balanced for k in self.kernels if k.sums_to_zero),
             f"sum to zero in every slice: {', '.join(balanced) or 'none'}; sums of the others: "
             f"{', '.join(others) or 'none'}; H lies in [{self.answer_low:.3g}, "
             f"{self.answer_high:.3g}] and not in [0, 1]",
@@ -300,7 +302,7 @@ def certify(
     model = model.at(voxel_size)
     with torch.no_grad():
         kernel, bias = model.observer()
-        k = kernel.detach().double().cpu()
+        k = kernel.detach().double()
         scene = Scene.of(sample_scene() if points is None else points, voxel_size, measurement)
         shifted, quarter = exact_errors(kernel, scene)
         half, turns = turns_of(model, scene, angles, tau)
@@ -333,11 +335,10 @@ def certify(
 
 def _mixing(model: VoxelModel) -> tuple[tuple[Kernel, ...], float | None, tuple[str, ...]]:
     """The kernels in numbers, the sum of the mixing weights, and who has a negative one."""
-    if not hasattr(model, "mixing_weights"):
+    if not isinstance(model, GeneoModel):
         return (), None, ()
-    names: Sequence[str] = model.names  # type: ignore[assignment]
-    weights = model.mixing_weights().detach().double().tolist()  # type: ignore[operator]
-    sampled = model.kernels().detach().double()  # type: ignore[operator]
+    weights = model.mixing_weights().detach().double().tolist()
+    sampled = model.kernels().detach().double()
     l1 = sampled.abs().sum(dim=(1, 2, 3)).tolist()
     total = sum(w * n for w, n in zip(weights, l1, strict=True)) or 1.0
     kernels = tuple(
@@ -348,9 +349,12 @@ def _mixing(model: VoxelModel) -> tuple[tuple[Kernel, ...], float | None, tuple[
             largest=float(g.abs().max()),
             total=float(g.sum()),
             slice_sum=float(g.sum(dim=(1, 2)).abs().max()),
+            sums_to_zero=kernel_named(geneo).sums_to_zero,
             share=weight * norm / total,
         )
-        for name, weight, norm, g in zip(names, weights, l1, sampled, strict=True)
+        for name, geneo, weight, norm, g in zip(
+            model.names, model.geneos, weights, l1, sampled, strict=True
+        )
     )
     negative = tuple(k.name for k in kernels if k.weight < -CONVEX_ROUNDING)
     return kernels, sum(weights), negative

@@ -56,7 +56,7 @@ def test_each_statement_has_the_number_that_goes_with_it(field):
     assert values["convex combination of GENEOs"] == field["weight_sum"]
     turned = [t["mean_h"] for t in field["turns"] if t["degrees"] % 90]
     assert values["equivariant under any rotation about z"] == max(turned)
-    assert values["cylinder and arrow sum to zero"] < 1e-4
+    assert values["zero-sum kernels sum to zero"] < 1e-4
 
 
 def test_of_a_cnn_only_what_a_convolution_has_is_said(card, tmp_path):

@@ -65,9 +65,17 @@ class Arrow(GeneoKernel):
     """
 
     name = "arrow"
+    sums_to_zero = True
     parameters = (
         ShapeParameter(
-            "r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5), BASE, body_radius
+            "r",
+            0.2,
+            2.0,
+            "voxel",
+            "radius of the tower's body",
+            metric=(0.1, 1.5),
+            by_hand=BASE,
+            sentence=body_radius,
         ),
         ShapeParameter(
             "sigma",
@@ -75,9 +83,8 @@ class Arrow(GeneoKernel):
             3.0,
             "voxel^2",
             "tolerance around both radii",
-            (0.15, 2.25),
-            None,
-            _head_sigma,
+            metric=(0.15, 2.25),
+            sentence=_head_sigma,
         ),
         ShapeParameter(
             "r_c",
@@ -85,12 +92,17 @@ class Arrow(GeneoKernel):
             3.0,
             "voxel",
             "reach of the tower's head, where the lines meet",
-            (0.3, 1.5),
-            None,
-            _head_reach,
+            metric=(0.3, 1.5),
+            sentence=_head_reach,
         ),
         ShapeParameter(
-            "beta", 0.1, 0.9, "1", "inclination of the head", (0.05, 0.95), sentence=_head_slope
+            "beta",
+            0.1,
+            0.9,
+            "1",
+            "inclination of the head",
+            metric=(0.05, 0.95),
+            sentence=_head_slope,
         ),
     )
 

@@ -29,9 +29,17 @@ class Cylinder(GeneoKernel):
     """g(x) = exp(-(||pi_-3(x - c)||^2 - r^2)^2 / (2 sigma^2)), summing to zero."""
 
     name = "cylinder"
+    sums_to_zero = True
     parameters = (
         ShapeParameter(
-            "r", 0.2, 2.0, "voxel", "radius of the tower's body", (0.1, 1.5), BASE, body_radius
+            "r",
+            0.2,
+            2.0,
+            "voxel",
+            "radius of the tower's body",
+            metric=(0.1, 1.5),
+            by_hand=BASE,
+            sentence=body_radius,
         ),
         ShapeParameter(
             "sigma",
@@ -39,9 +47,8 @@ class Cylinder(GeneoKernel):
             3.0,
             "voxel^2",
             "tolerance around that radius",
-            (0.15, 2.25),
-            None,
-            _body_sigma,
+            metric=(0.15, 2.25),
+            sentence=_body_sigma,
         ),
     )
 

@@ -45,9 +45,8 @@ class NegativeSphere(GeneoKernel):
             3.0,
             "voxel",
             "radius of the crowns it weighs",
-            (0.1, 1.5),
-            None,
-            _crown_radius,
+            metric=(0.1, 1.5),
+            sentence=_crown_radius,
         ),
         ShapeParameter(
             "sigma",
@@ -55,9 +54,8 @@ class NegativeSphere(GeneoKernel):
             3.0,
             "voxel^2",
             "tolerance around that radius",
-            (0.15, 2.25),
-            None,
-            _crown_sigma,
+            metric=(0.15, 2.25),
+            sentence=_crown_sigma,
         ),
         ShapeParameter(
             "omega",
@@ -65,9 +63,8 @@ class NegativeSphere(GeneoKernel):
             0.15,
             "1",
             "weight against full surroundings",
-            (0.02, 0.6),
-            None,
-            _crown_omega,
+            metric=(0.02, 0.6),
+            sentence=_crown_omega,
         ),
     )
 

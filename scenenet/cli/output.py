@@ -6,6 +6,8 @@ import json
 from collections.abc import Callable
 from typing import Any
 
+from scenenet.metrics.score_columns import SCORE_COLUMNS
+
 
 def show(data: Any, as_json: bool, lines: Callable[[Any], list[str]]) -> None:
     """Print ``data`` as JSON, or as the ``lines`` for people."""
@@ -26,14 +28,12 @@ def training_lines(result: dict[str, Any]) -> list[str]:
 
 def score_lines(result: dict[str, Any]) -> list[str]:
     def row(name: str, scores: dict[str, float]) -> str:
-        return f"{name:<24}" + "".join(
-            f"{scores[key]:>10.3f}" for key in ("precision", "recall", "f05", "iou_tower", "miou")
-        )
+        return f"{name:<24}" + "".join(f"{scores[column.name]:>10.3f}" for column in SCORE_COLUMNS)
 
     towers = result["towers"]
     error = towers["median_error_m"]
     return [
-        f"{'':<24}" + "".join(f"{n:>10}" for n in ("P", "R", "F0.5", "tower IoU", "macro IoU")),
+        f"{'':<24}" + "".join(f"{column.label:>10}" for column in SCORE_COLUMNS),
         row(result["model"], result["voxel"]),
         row("  occupied voxels only", result["voxel_occupied"]),
         row("  voxels at or above tau", result["voxel_observer"]),

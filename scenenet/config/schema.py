@@ -24,7 +24,8 @@ from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
 from scenenet.experiments.contenders import contenders
 from scenenet.experiments.cross_validation.settings import CrossValidationSettings
-from scenenet.experiments.label_noise.settings import NoiseSettings
+from scenenet.experiments.label_noise.settings import LabelNoiseSettings
+from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
 from scenenet.pointcloud.class_schemes import Codes
@@ -105,7 +106,7 @@ class Config(Settings):
         (), description="many small trainings that differ in one thing; config/studies.yaml"
     )
     cross_validation: CrossValidationSettings = CrossValidationSettings()
-    label_noise: NoiseSettings = NoiseSettings()
+    label_noise: LabelNoiseSettings = LabelNoiseSettings()
     detection: DetectionSettings = DetectionSettings()
     predict: Prediction = Prediction()
     tracking: TrackingSettings = TrackingSettings()
@@ -165,16 +166,16 @@ class Config(Settings):
 
     def crossed_models(self) -> list[ModelSettings]:
         """The models that are cross-validated."""
-        told = self.cross_validation.contenders
-        return contenders(told, self.models, "cross_validation.contenders")
+        chosen = self.cross_validation.contenders
+        return contenders(chosen, self.models, "cross_validation.contenders")
 
     def experiments(self) -> list[str]:
-        """Names of the experiments that are switched on (``scenenet.experiments``)."""
-        switches = {
-            "cross_validation": self.cross_validation.leave_out,
-            "label_noise": self.label_noise.levels,
-        }
-        return [name for name, switch in switches.items() if switch]
+        """Names of the experiments that are switched on, in the order of the registry."""
+        return [
+            name
+            for name, experiment in EXPERIMENTS.items()
+            if getattr(getattr(self, name), experiment.switch)
+        ]
 
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)

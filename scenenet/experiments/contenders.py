@@ -12,48 +12,49 @@ from scenenet.models.settings import ModelSettings
 
 
 class Contender(Settings):
-    """A model of the configuration, perhaps trained otherwise."""
+    """A model of the configuration, with other settings if wanted."""
 
     model: str = Field(description="name of the model")
     changes: dict[str, Any] = Field(
         default_factory=dict,
         description="dotted settings of the model and their values: training.learning_rate",
     )
-    name: str | None = Field(None, description="how tables call it; null for the model's name")
+    name: str | None = Field(None, description="its name in tables; null for the name of the model")
 
 
 def contenders(
-    told: Sequence[Contender], models: Sequence[ModelSettings], place: str
+    chosen: Sequence[Contender], models: Sequence[ModelSettings], place: str
 ) -> list[ModelSettings]:
-    """The settings of the models that take part, under the names that tables call them.
+    """The settings of the models that take part, each with its name in tables.
 
     Args:
-        told: the contenders; without any, every model takes part as it is.
+        chosen: the contenders; if empty, every model takes part unchanged.
         models: of the configuration.
-        place: what to call the setting in messages.
+        place: the setting, for messages.
 
     Raises:
-        ValueError: a model or a setting is not known, or two have the same name.
+        ValueError: a model or a setting does not exist, or two contenders have the same name.
     """
-    if not told:
+    if not chosen:
         return list(models)
     known = {model.name: model for model in models}
-    chosen = []
-    for one in told:
+    found = []
+    for one in chosen:
         if one.model not in known:
             raise ValueError(f"{place}: {one.model!r} is not one of the models")
         try:
             changes = {**one.changes, "name": one.name or one.model}
-            chosen.append(changed(known[one.model], changes))
+            found.append(changed(known[one.model], changes))
         except ValidationError as error:
-            raise ValueError(f"{place}, {one.model}: {_fault(error)}") from None
-    names = [model.name for model in chosen]
+            raise ValueError(f"{place}, {one.model}: {fault_of(error)}") from None
+    names = [model.name for model in found]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise ValueError(f"{place}: {', '.join(twice)} is there more than once")
-    return chosen
+        raise ValueError(f"{place}: {', '.join(twice)} is listed more than once")
+    return found
 
 
-def _fault(error: ValidationError) -> str:
+def fault_of(error: ValidationError) -> str:
+    """The first wrong setting and what is wrong with it."""
     fault = error.errors()[0]
     setting = ".".join(map(str, fault["loc"]))
     return f"{setting}: {fault['msg']}" if setting else fault["msg"]

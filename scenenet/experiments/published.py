@@ -1,4 +1,4 @@
-"""The numbers the thesis publishes, to stand beside ours (``config/thesis.yaml``)."""
+"""The numbers published in the thesis (``config/thesis.yaml``), for comparison."""
 
 from __future__ import annotations
 
@@ -12,21 +12,23 @@ from scenenet.core.settings import Settings
 
 
 class Published(Settings):
-    """One published number, or a range where the thesis gives only that."""
+    """One published number, or a range if the thesis gives only a range."""
 
     value: float | None = Field(None, description="the number, in `unit`")
-    spread: float | None = Field(None, description="its standard deviation, where one is given")
-    low: float | None = Field(None, description="lower bound of the range it lies in")
-    high: float | None = Field(None, description="upper bound of the range it lies in")
-    unit: str | None = Field(None, description="unit; none for shares in 0-1 and counts")
+    spread: float | None = Field(None, description="its standard deviation, if published")
+    low: float | None = Field(None, description="lower bound of the published range")
+    high: float | None = Field(None, description="upper bound of the published range")
+    unit: str | None = Field(
+        None, description="unit; null for counts and for shares between 0 and 1"
+    )
     place: str = Field(description="section, table or figure of the thesis")
-    what: str | None = Field(None, description="what the number is")
+    what: str | None = Field(None, description="meaning of the number")
 
 
 class Thesis(Settings):
-    """Every published number by a dotted name, such as ``models.cnn.precision``."""
+    """Every published number by a dotted name such as ``models.cnn.precision``."""
 
-    source: str = Field(description="where the numbers are from")
+    source: str = Field(description="the publication")
     numbers: Mapping[str, Published] = Field(description="name -> number")
 
     def number(self, name: str) -> Published | None:
@@ -43,8 +45,7 @@ def read_thesis(path: str | Path) -> Thesis:
     """Read the published numbers.
 
     Raises:
-        InputError: the file cannot be read or a number is not written as it should be; the message
-            names the number.
+        InputError: the file cannot be read, or a number is not valid; the message names it.
     """
     import yaml
 

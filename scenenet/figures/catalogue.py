@@ -14,6 +14,7 @@ from typing import Any
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json, write_json
 from scenenet.experiments.published import Thesis
+from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.figures import crops as crop_figures
 from scenenet.figures import dataset as dataset_figures
 from scenenet.figures import models as model_figures
@@ -128,9 +129,9 @@ def plan(
     for study in results.studies:
         draw = _bind(model_figures.draw_study, results, study, thesis)
         planned.append(Drawing(f"study-{study.name}", study.title, "studies", draw))
-    for experiment in results.experiments:
-        title, draw_experiment = EXPERIMENT_DRAWINGS[experiment]
-        planned.append(Drawing(experiment, title, experiment, _bind(draw_experiment, results)))
+    for name in results.experiments:
+        draw = _bind(_draw_experiment, results, name)
+        planned.append(Drawing(name, EXPERIMENTS[name].title, name, draw))
     return planned
 
 
@@ -169,6 +170,10 @@ def read_pictures(folder: str | Path, names: Iterable[str]) -> list[Picture]:
             )
         pictures.append(Picture(**{**entry, "file": file, "models": tuple(entry["models"])}))
     return pictures
+
+
+def _draw_experiment(results: Results, name: str, out: Path) -> tuple[str, str]:
+    return EXPERIMENT_DRAWINGS[name](results.experiment_runs(name), out)
 
 
 def _bind(draw: Callable[..., tuple[str, str]], *known: Any) -> Callable[[Path], tuple[str, str]]:

@@ -1,39 +1,43 @@
-"""Figures of the experiments: cross-validation and label noise."""
+"""Figures of the experiments: cross-validation and label noise.
+
+Every function that draws writes one PNG and returns (alternative text, caption).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+import pandas as pd
+
 from scenenet.experiments.cross_validation.summary import summarise_folds
-from scenenet.experiments.label_noise.summary import summarise_noise
-from scenenet.figures.plots.experiments import cross_validation, noise
-from scenenet.results.folder import Results
+from scenenet.experiments.label_noise.summary import summarise_label_noise
+from scenenet.figures.plots.experiments import cross_validation, label_noise
 
 
-def draw_noise(results: Results, out: Path) -> tuple[str, str]:
-    summary = summarise_noise(results.experiment_runs("label_noise"))
-    alt = noise(summary, out)
-    return alt, (
-        "Trained and tuned on labels that are wrong by a known share, scored on towers further "
-        "down the line, on the left against labels as wrong as those and on the right against the "
-        f"truth. Mean and standard deviation over {summary['n_seeds'].max()} seeds, each with a "
-        "line of its own. Dashed: how good the labels themselves are. Thesis 5.2.5."
+def draw_label_noise(runs: pd.DataFrame, out: Path) -> tuple[str, str]:
+    summary = summarise_label_noise(runs)
+    return label_noise(summary, out), (
+        "F0.5 of models that were trained and tuned on labels of which a known share is wrong, on "
+        "test towers further along the line. Left: compared with labels of the same quality. "
+        "Right: "
+        f"compared with the truth. Mean and standard deviation over {summary['n_seeds'].max()} "
+        "seeds, each with its own line. Dashed: the labels themselves. Thesis 5.2.5."
     )
 
 
-def draw_cross_validation(results: Results, out: Path) -> tuple[str, str]:
-    runs = results.experiment_runs("cross_validation")
-    alt = cross_validation(runs, out)
+def draw_cross_validation(runs: pd.DataFrame, out: Path) -> tuple[str, str]:
     row = summarise_folds(runs).iloc[0]
-    return alt, (
-        f"Each of {row['crops']} crops is left out once, in {row['n_folds']} folds; models are "
-        "trained and tuned on the others. Points: means over the folds; bars: standard deviation "
-        f"of that mean over {row['n_seeds']} seeds; strokes: F0.5 of each fold, mean over seeds."
+    return cross_validation(runs, out), (
+        f"Cross-validation over {row['crops']} crops in {row['n_folds']} folds: models are tested "
+        "on one fold, trained and tuned on the others. Points: mean over the folds. Bars: standard "
+        f"deviation of that mean over {row['n_seeds']} seeds. Ticks: F0.5 of each fold, mean over "
+        "seeds."
     )
 
 
-EXPERIMENT_DRAWINGS = {
-    "cross_validation": ("Every crop a test crop once", draw_cross_validation),
-    "label_noise": ("Trained on wrong labels", draw_noise),
+EXPERIMENT_DRAWINGS: Mapping[str, Callable[[pd.DataFrame, Path], tuple[str, str]]] = {
+    "cross_validation": draw_cross_validation,
+    "label_noise": draw_label_noise,
 }
-"""Title and drawing of each experiment."""
+"""How the runs of each experiment of ``scenenet.experiments.registry`` are drawn."""

@@ -68,13 +68,13 @@ def draw_kernels(results: Results, model: str, out: Path) -> tuple[str, str]:
     from scenenet.figures.plots.parameters import kernels
     from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
-    from scenenet.results.initial_models import start_of
+    from scenenet.results.initial_models import initial_model
 
     champion = champion_of(results, model)
     trained, _ = read_model(champion.model_files[0])
-    start = start_of(champion, trained)
+    start = initial_model(champion, trained)
     alt = kernels(_slices(trained), out, start and _slices(start.model), trained.voxel_size)
-    before = "" if start is None else f"The rows above are those {start.said}. "
+    before = "" if start is None else f"The rows above are those {start.origin}. "
     figures = "As thesis Figures 4.2 to 4.4." if isinstance(trained, GeneoModel) else ""
     return alt, (
         f"Slices through the middle of each kernel of {model}, seed {champion.seed} (best on "

@@ -1,1 +1,1 @@
-"""Scores of voxels and of towers (thesis 5.2.4)."""
+"""Scores of voxels and of tower positions (thesis 5.2.4)."""

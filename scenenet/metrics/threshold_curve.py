@@ -6,23 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenenet.metrics.voxel_scores import BETA, Confusion
+from scenenet.metrics.score_columns import BETA
+from scenenet.metrics.voxel_scores import Confusion
 
 THRESHOLDS = np.tanh(np.arange(1, 651) / 100)
-"""The thresholds that are tried, (650,), ascending; without 0, where everything would be a tower.
+"""Candidate thresholds, (650,), ascending; without 0, where every voxel would be a tower.
 
-They are evenly spaced in what the observer answers before tanh (thesis 4.3). An observer that sums
-up dozens of voxels has most of its probabilities above 0.99, where evenly spaced thresholds could
-not tell them apart; beyond the last one float32 cannot tell neighbours apart either.
+They are evenly spaced in the output of the observer before tanh (thesis 4.3). An observer that sums
+dozens of voxels has most of its probabilities above 0.99, where evenly spaced thresholds could not
+separate them; beyond the last threshold, neighbours are equal in float32.
 """
 
 
 @dataclass(frozen=True)
 class ThresholdCurve:
-    """Confusions at every one of ``THRESHOLDS``; curves of several samples add up.
+    """Counts of voxels at every one of ``THRESHOLDS``; curves of several samples add up.
 
     Attributes:
-        true, false: (651,) counts of tower and of other voxels that reach i of the thresholds.
+        true, false: (651,) numbers of voxels labelled tower, and of other voxels, whose probability
+            reaches exactly i of the thresholds.
     """
 
     true: np.ndarray
@@ -30,17 +32,17 @@ class ThresholdCurve:
 
     @classmethod
     def empty(cls) -> ThresholdCurve:
-        """Of no voxels: where a sum begins."""
+        """The curve of no voxels, to start a sum with."""
         nothing = np.zeros(len(THRESHOLDS) + 1, np.int64)
         return cls(nothing, nothing)
 
     @classmethod
     def of(cls, probability: np.ndarray, tower: np.ndarray) -> ThresholdCurve:
-        """From probabilities (V,) and truth (V,) bool; all voxels of the grid must be given."""
-        # Compared in the probabilities' own type, as ``confusion`` does: 0.3 counts for 0.3.
+        """The curve of probabilities (V,) and labels (V,) bool of all V voxels of a grid."""
+        # Compared in the type of the probabilities, as in ``confusion``: 0.3 reaches 0.3.
         taus = THRESHOLDS.astype(probability.dtype)
-        # Most voxels are empty and have probability 0; they are counted and not sorted into bins.
-        # What is not a number is no tower either.
+        # Most voxels are empty and have probability 0: they are counted without a search. NaN
+        # counts as no tower, too.
         some = np.flatnonzero(probability > 0)
         bins, truth = np.searchsorted(taus, probability[some], side="right"), tower[some]
         n = len(THRESHOLDS) + 1
@@ -59,19 +61,19 @@ class ThresholdCurve:
         return THRESHOLDS
 
     def confusion(self, step: int) -> Confusion:
-        """At ``tau[step]``."""
+        """The counts at ``tau[step]``."""
         tp, fp = int(self.true[step + 1 :].sum()), int(self.false[step + 1 :].sum())
         return Confusion(tp, fp, int(self.true.sum()) - tp, int(self.false.sum()) - fp)
 
     def at(self, tau: float) -> Confusion:
-        """At one of the thresholds.
+        """The counts at one of the thresholds.
 
         Raises:
-            ValueError: ``tau`` is none of them.
+            ValueError: ``tau`` is not one of them.
         """
         (steps,) = np.nonzero(self.tau == tau)
         if len(steps) != 1:
-            raise ValueError(f"{tau} is none of the {len(self.tau)} thresholds")
+            raise ValueError(f"{tau} is not one of the {len(self.tau)} thresholds")
         return self.confusion(int(steps[0]))
 
     def precision_recall(self) -> tuple[np.ndarray, np.ndarray]:
@@ -82,7 +84,7 @@ class ThresholdCurve:
         return tp / detected, tp / max(1, int(self.true.sum()))
 
     def best(self) -> tuple[float, Confusion]:
-        """tau with the highest F0.5, the highest such tau in a tie, and the counts there."""
+        """tau with the highest F0.5 (the highest such tau in a tie), and the counts at it."""
         precision, recall = self.precision_recall()
         b2 = BETA**2
         below = b2 * precision + recall

@@ -1,4 +1,4 @@
-"""Predicted towers matched with true ones by position."""
+"""Predicted towers matched with labelled towers by position."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenenet.metrics.voxel_scores import _ratio
+from scenenet.metrics.score_columns import ratio
 
 
 @dataclass(frozen=True)
 class TowerMatch:
-    """Predicted towers against true ones.
+    """The outcome of matching predicted towers with labelled towers.
 
     Attributes:
-        errors: (hits,) m, planar distance of each predicted tower to the true one it hit.
-        n_true, n_predicted: number of towers.
+        errors: (hits,) m, planar distance of each hit from its labelled tower.
+        n_true, n_predicted: numbers of labelled and of predicted towers.
     """
 
     errors: np.ndarray
@@ -30,10 +30,11 @@ class TowerMatch:
         )
 
     def scores(self) -> dict[str, float | int | None]:
+        """The numbers of ``scenenet.metrics.score_columns.MATCH_COLUMNS`` by their names."""
         hits = len(self.errors)
         return {
-            "precision": _ratio(hits, self.n_predicted),
-            "recall": _ratio(hits, self.n_true),
+            "precision": ratio(hits, self.n_predicted),
+            "recall": ratio(hits, self.n_true),
             "median_error_m": float(np.median(self.errors)) if hits else None,
             "n_true": self.n_true,
             "n_predicted": self.n_predicted,
@@ -41,13 +42,19 @@ class TowerMatch:
 
 
 HIT_DISTANCE_M = 5.0
-"""A predicted tower this near (xy) to a true one is a hit (docs/development/architecture.md)."""
+"""A predicted tower within this planar distance of a labelled tower is a hit."""
 
 
 def match_towers(
     predicted: np.ndarray, true: np.ndarray, distance: float = HIT_DISTANCE_M
 ) -> TowerMatch:
-    """Pair predicted (P, 2) with true (T, 2) positions, nearest pairs first, each used once."""
+    """Pair predicted with labelled towers, nearest pairs first; each tower is used at most once.
+
+    Args:
+        predicted: (P, 2) m, x and y.
+        true: (T, 2) m, x and y.
+        distance: m, largest planar distance of a pair.
+    """
     predicted = np.asarray(predicted, float).reshape(-1, 2)
     true = np.asarray(true, float).reshape(-1, 2)
     apart = np.linalg.norm(predicted[:, None] - true[None], axis=2)

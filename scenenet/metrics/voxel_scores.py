@@ -1,4 +1,4 @@
-"""Scores of voxels (thesis 5.2.4.1), as docs/development/architecture.md defines them."""
+"""Counts of predicted against labelled voxels (thesis 5.2.4.1)."""
 
 from __future__ import annotations
 
@@ -6,13 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BETA = 0.5
-"""Precision counts twice as much as recall (thesis 5.2.4.1)."""
+from scenenet.metrics import score_columns
+from scenenet.metrics.score_columns import SCORE_COLUMNS
 
 
 @dataclass(frozen=True)
 class Confusion:
-    """Counts of voxels, predicted against true. Sums of them are scores over all samples."""
+    """Counts of voxels, predicted against labelled.
+
+    Counts of several samples add up, so that a score is taken over all their voxels together.
+    """
 
     tp: int = 0
     fp: int = 0
@@ -26,53 +29,50 @@ class Confusion:
 
     @property
     def precision(self) -> float:
-        return _ratio(self.tp, self.tp + self.fp)
+        return score_columns.precision(self)
 
     @property
     def recall(self) -> float:
-        return _ratio(self.tp, self.tp + self.fn)
+        return score_columns.recall(self)
 
     @property
     def f05(self) -> float:
-        """F_beta = (1 + beta^2) P R / (beta^2 P + R), beta = 0.5."""
-        b2 = BETA**2
-        return _ratio((1 + b2) * self.tp, (1 + b2) * self.tp + b2 * self.fn + self.fp)
+        """As ``scenenet.metrics.score_columns.f05``."""
+        return score_columns.f05(self)
 
     @property
     def iou_tower(self) -> float:
-        return _ratio(self.tp, self.tp + self.fp + self.fn)
+        return score_columns.iou_tower(self)
 
     @property
     def iou_background(self) -> float:
-        return _ratio(self.tn, self.tn + self.fp + self.fn)
+        return score_columns.iou_background(self)
 
     @property
     def miou(self) -> float:
-        """Mean over {background, tower}: the thesis' "IoU". Predicting nothing scores about 0.5."""
-        return (self.iou_tower + self.iou_background) / 2
+        """As ``scenenet.metrics.score_columns.miou``."""
+        return score_columns.miou(self)
 
     def scores(self) -> dict[str, float]:
-        return {
-            name: float(getattr(self, name))
-            for name in ("precision", "recall", "f05", "iou_tower", "miou")
-        }
+        """Every score of ``scenenet.metrics.score_columns`` by its name."""
+        return {column.name: float(column.compute(self)) for column in SCORE_COLUMNS}
 
     def without_predictions(self) -> Confusion:
-        """The trivial baseline on the same voxels: a model that never says tower."""
+        """The trivial baseline on the same voxels: a model that never predicts tower."""
         return Confusion(tp=0, fp=0, fn=self.tp + self.fn, tn=self.tn + self.fp)
 
 
 def confusion(
     probability: np.ndarray, tower: np.ndarray, tau: float, n_voxels: int | None = None
 ) -> Confusion:
-    """Compare probabilities with the truth at ``tau``: tower where probability >= tau > 0.
+    """Compare probabilities with labels at ``tau``: a voxel is tower where probability >= tau > 0.
 
     Args:
-        probability: (V,) probabilities; of any voxels as long as all predicted and all true ones
-            are among them.
-        tower: (V,) bool.
-        n_voxels: number of voxels that count; V if None. The V given ones come first, the rest is
-            taken for correctly predicted background.
+        probability: (V,) probabilities. Voxels may be left out if they are neither predicted nor
+            labelled tower.
+        tower: (V,) bool, labels.
+        n_voxels: number of voxels of the grid; V if None. Those beyond the V given ones count as
+            correctly predicted background.
     """
     detected = probability >= tau
     tp = int(np.count_nonzero(detected & tower))
@@ -80,8 +80,3 @@ def confusion(
     fn = int(np.count_nonzero(tower)) - tp
     total = probability.size if n_voxels is None else n_voxels
     return Confusion(tp, fp, fn, total - tp - fp - fn)
-
-
-def _ratio(part: float, whole: float) -> float:
-    """0 where there is nothing to divide by, as a model that detects nothing has precision 0."""
-    return part / whole if whole else 0.0

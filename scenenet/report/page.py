@@ -1,4 +1,4 @@
-"""The page: one file that opens offline, with everything in it."""
+"""The report: one HTML file that contains everything and opens offline."""
 
 from __future__ import annotations
 
@@ -11,30 +11,33 @@ from scenenet.core.errors import InputError
 from scenenet.core.files import write_text
 from scenenet.experiments.published import Thesis
 from scenenet.report.blocks import Section
-from scenenet.report.context import Material, SectionMaker
+from scenenet.report.context import ReportContext, SectionMaker
 from scenenet.report.sections import crops as crop_sections
 from scenenet.report.sections import dataset as dataset_sections
-from scenenet.report.sections import experiments as experiment_sections
 from scenenet.report.sections import models as model_sections
 from scenenet.report.sections import overview
 from scenenet.report.sections import parameters as parameter_sections
 from scenenet.report.sections import studies as study_sections
 from scenenet.report.sections import surveys as survey_sections
+from scenenet.report.sections.experiments import EXPERIMENT_SECTIONS
 from scenenet.results.folder import Results
 
-TITLE = "Towers of power lines, found by SCENE-Net"
+TITLE = "Detection of power-line towers in LiDAR surveys with SCENE-Net"
 ASSETS = Path(__file__).parent / "assets"
+
+MAIN_EXPERIMENT = "cross_validation"
+"""The experiment that is shown first, because every crop counts in it."""
 
 SECTIONS: Sequence[SectionMaker] = (
     overview.overview,
-    experiment_sections.cross_validation,
+    EXPERIMENT_SECTIONS[MAIN_EXPERIMENT],
     model_sections.models,
     model_sections.positions,
     parameter_sections.learned,
     parameter_sections.certificate,
     crop_sections.crops,
     study_sections.studies,
-    experiment_sections.noise,
+    *(make for name, make in EXPERIMENT_SECTIONS.items() if name != MAIN_EXPERIMENT),
     study_sections.thesis_and_ours,
     survey_sections.predictions,
     dataset_sections.data,
@@ -43,28 +46,28 @@ SECTIONS: Sequence[SectionMaker] = (
     model_sections.training,
     survey_sections.provenance,
 )
-"""In the order of the page. A section that has nothing to show is left out."""
+"""The sections in the order of the page. A section without results is left out."""
 
 
 def write_report(
     results: Results, thesis: Thesis, out: str | Path, title: str = TITLE
 ) -> list[Section]:
-    """Write the page of a result folder from its tables, pictures and predictions.
+    """Write the report of a result folder from its tables, figures and predictions.
 
     Args:
-        results: the result folder; its ``tables`` and ``figures`` are shown as they are there.
+        results: the result folder; its ``tables`` and ``figures`` are shown as they are.
         thesis: published numbers.
         out: HTML file to write; needs no other file and no network.
         title: of the page.
 
     Returns:
-        the sections that are on the page.
+        the sections of the page.
 
     Raises:
-        InputError: a result is broken, or a picture is missing.
+        InputError: a result file is broken, or a figure is missing.
     """
-    material = Material(results, thesis)
-    made = [section for make in SECTIONS if (section := make(material)) is not None]
+    context = ReportContext(results, thesis)
+    made = [section for make in SECTIONS if (section := make(context)) is not None]
     write_text(out, render(made, title, thesis.source))
     return made
 

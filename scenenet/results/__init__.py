@@ -1,1 +1,1 @@
-"""What a run left in its result folder, and the tables that are made from it."""
+"""The result files of a run, and the tables that are made from them."""

@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import pandas as pd
 
 from scenenet.experiments.published import Thesis
 from scenenet.results.folder import Results
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 def classes(results: Results, thesis: Thesis) -> pd.DataFrame:
     """Table 5.1: share of each class in the points of all surveys together.
 
-    ``lowest_percent`` and ``highest_percent`` are the shares in the survey with the fewest and the
-    most. The thesis' share stands beside a class of the EDP scheme; those it lists and our surveys
-    do not have are kept with a share of zero.
+    ``lowest_percent`` and ``highest_percent`` are the lowest and the highest share in a single
+    survey. Classes of the EDP scheme have the share of the thesis, too; classes that only the
+    thesis lists have a share of zero.
     """
-    import pandas as pd
-
     columns = ["code", "class", "points", "share_percent", "lowest_percent", "highest_percent",
                "thesis_percent"]  # fmt: skip
     counts = results.class_counts()
@@ -47,8 +42,6 @@ def classes(results: Results, thesis: Thesis) -> pd.DataFrame:
 
 def towers(results: Results, thesis: Thesis) -> pd.DataFrame:
     """Properties of the labelled towers (thesis 5.1.2), one row per property."""
-    import pandas as pd
-
     columns = ["property", "unit", "towers", "mean", "std", "lowest", "highest",
                "thesis_mean", "thesis_lowest", "thesis_highest"]  # fmt: skip
     tables = [table for table in results.towers().values() if len(table)]
@@ -68,10 +61,8 @@ def towers(results: Results, thesis: Thesis) -> pd.DataFrame:
 def voxelisation(results: Results, thesis: Thesis) -> pd.DataFrame:
     """Time and size of voxelised crops (thesis 5.1.4), one row per grid.
 
-    ``seconds`` is the mean time for one crop, the files not counted.
+    ``seconds`` is the mean time for one crop without reading files.
     """
-    import pandas as pd
-
     columns = ["grid", "samples", "seconds", "seconds_std", "occupied_voxels", "tower_voxels",
                "tower_share_percent", "thesis_seconds"]  # fmt: skip
     timed = results.grid_times()

@@ -1,4 +1,4 @@
-"""What a run has left in its result folder, read for tables, figures, MLflow and the report."""
+"""The result files of a run, read for tables, figures, MLflow and the report."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 from scenenet.models.settings import BOOSTED_TREES
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from scenenet.experiments.studies.settings import StudySettings
 
 HISTORY_MEASURES = frozenset({"epoch", "loss", "fidelity", "penalty", "seconds", "learning_rate"})
@@ -27,14 +27,14 @@ class SeedResult:
 
     Attributes:
         model: name of the model in the configuration.
-        kind: architecture, ``scenenet`` or ``cnn``: what the thesis calls it.
+        kind: architecture: ``scenenet``, ``cnn`` or ``BOOSTED_TREES``.
         seed: the seed it was trained from.
         evaluation: scores on the test crops (``evaluate/MODEL/seed-N.json``).
         tuning: tau and the scores on the validation crops; None before tuning.
         history: one row per epoch; None if the model was not trained here.
-        provenance: what the training was made from.
-        resources: what the training used (``scenenet.core.peak_memory.used``).
-        model_files: the tuned model, one file or two (weights apart).
+        provenance: record of settings, inputs and code of the training.
+        resources: memory and time of the training (``scenenet.core.peak_memory.used``).
+        model_files: files of the tuned model.
     """
 
     model: str
@@ -49,7 +49,8 @@ class SeedResult:
 
     @property
     def alive(self) -> bool:
-        """Whether it detects anything at all (thesis 5.2.6: four of five CNNs do not)."""
+        """Whether the model is live: it detects a tower voxel (thesis 5.2.6: one CNN in five
+        is)."""
         return bool(self.evaluation["alive"])
 
     @property
@@ -72,20 +73,20 @@ class SeedResult:
 
 @dataclass(frozen=True)
 class Results:
-    """A result folder and what was asked for in it.
+    """A result folder and the parts of the configuration that its results depend on.
 
-    Nothing is read on construction. A stage that left nothing gives empty answers; a
-    file that is there and broken is an error.
+    Nothing is read on construction. If a stage has no results, the result is empty or None; a
+    broken file is an error.
 
     Attributes:
         folder: the result folder.
         models: name of each model -> its architecture (``scenenet`` or ``cnn``).
         seeds: seeds of the trainings.
-        surveys: surveys that make the data set.
-        predicted: surveys that were classified.
-        studies: what was studied beside.
-        experiments: which of ``scenenet.experiments`` were run.
-        predicts: the model that classifies surveys; the first SCENE-Net where none is named.
+        surveys: surveys of the data set.
+        predicted: new surveys that were classified.
+        studies: the studies of the run.
+        experiments: names of the experiments of the run (``scenenet.experiments.registry``).
+        predicts: the model that classifies surveys; None for the first SCENE-Net.
     """
 
     folder: Path
@@ -102,7 +103,8 @@ class Results:
 
     @property
     def predicting(self) -> str | None:
-        """The model that pictures and the opening of the page are about; None without models."""
+        """The model that classifies surveys; figures and the summary show it. None without
+        models."""
         scenenets = [model for model, kind in self.models.items() if kind == "scenenet"]
         named = [] if self.predicts is None else [self.predicts]
         return next(
@@ -120,6 +122,7 @@ class Results:
         ]
 
     def of_model(self, model: str) -> list[SeedResult]:
+        """The evaluated trainings of one model."""
         return [result for result in self.trained if result.model == model]
 
     def champion(self, model: str) -> SeedResult | None:
@@ -128,10 +131,10 @@ class Results:
         return max(tuned, key=lambda r: r.validation["f05"], default=None)
 
     def seed(self, model: str, seed: int) -> SeedResult:
-        """Read all there is of one training.
+        """Read all results of one training.
 
         Raises:
-            InputError: it has not been evaluated, or a file cannot be understood.
+            InputError: it has not been evaluated, or a file is broken.
         """
         training = self.folder / "train" / model / f"seed-{seed}"
         evaluation = read_result(self._evaluation(model, seed))
@@ -151,15 +154,15 @@ class Results:
         )
 
     def scene(self, rank: str) -> Mapping[str, Any] | None:
-        """The best, median or worst test crop as voxels; None if it was not made."""
+        """The best, median or worst test crop as voxels; None if there is none."""
         return self._if_there("interactive_crop", f"{rank}.json")
 
     def certificate(self, model: str) -> Mapping[str, Any] | None:
-        """Which promises of a GENEO a model keeps; None if it was not asked."""
+        """Which properties of a GENEO a model has; None if that was not verified."""
         return self._if_there("certificate", f"{model}.json")
 
     def timing(self, model: str) -> Mapping[str, Any] | None:
-        """How long a model takes for a crop; None if it was not timed."""
+        """Inference time of a model; None if it was not measured."""
         return self._if_there("inference_time", f"{model}.json")
 
     def boosted_trees_times(self) -> Mapping[str, Any] | None:
@@ -177,12 +180,12 @@ class Results:
         ]
 
     def study_runs(self, study: str) -> pd.DataFrame | None:
-        """A row per variant and seed of a study; None if it was not run."""
+        """The runs of a study, a row per variant and seed; None if it was not run."""
         path = self.folder / "study" / study / "runs.csv"
         return read_table(path) if path.exists() else None
 
     def experiment_runs(self, experiment: str) -> pd.DataFrame:
-        """A row per model and seed, and per value of what else the experiment varies.
+        """The runs of an experiment, a row per training (and way to count).
 
         Raises:
             InputError: the experiment was not run.
@@ -195,7 +198,7 @@ class Results:
         return files[0] if files else None
 
     def checks(self) -> dict[str, Mapping[str, Any]]:
-        """The check report of each survey, those only predicted included."""
+        """The check report of each survey, including those that are only classified."""
         surveys = dict.fromkeys([*self.surveys, *self.predicted])
         return self._each(surveys, "check", "report.json", read_result)
 
@@ -233,8 +236,8 @@ class Results:
     def provenances(self) -> list[tuple[str, Mapping[str, Any]]]:
         """Every provenance record with its path in the result folder, sorted.
 
-        Those of the report and of MLflow are left out: they are made while the page is written, or
-        after it, and would make two pages of the same results differ.
+        The records of the report and of MLflow are left out: they are written during or after the
+        report, so that two reports of the same results would differ.
         """
         found = []
         for path in sorted(self.folder.glob("**/*provenance.json")):
@@ -269,7 +272,7 @@ class Results:
 
 
 def parameter_columns(history: pd.DataFrame) -> list[str]:
-    """Columns of a training history that hold parameters of the model, such as ``cylinder.r``."""
+    """Columns of a training history with parameters of the model, such as ``cylinder.r``."""
     return [
         name
         for name in history.columns
@@ -278,7 +281,7 @@ def parameter_columns(history: pd.DataFrame) -> list[str]:
 
 
 def read_result(path: Path) -> Mapping[str, Any]:
-    """A JSON result.
+    """Read a JSON result.
 
     Raises:
         InputError: the file is missing or is not a JSON object.
@@ -295,13 +298,11 @@ def read_result(path: Path) -> Mapping[str, Any]:
 
 
 def read_table(path: Path) -> pd.DataFrame:
-    """A CSV result.
+    """Read a CSV result.
 
     Raises:
         InputError: the file is missing or is not a table.
     """
-    import pandas as pd
-
     try:
         return pd.read_csv(path)
     except OSError as error:

@@ -1,4 +1,4 @@
-"""What a model was before it was trained (thesis 4.4, 5.2.1)."""
+"""The initial model of a training (thesis 4.4, 5.2.1)."""
 
 from __future__ import annotations
 
@@ -13,26 +13,32 @@ from scenenet.results.folder import SeedResult, parameter_columns
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
 
-DRAWN = "drawn from the seed, as training began with them"
-FIRST_STEP = "after the first step of the training, the earliest that is kept"
+DRAWN = "drawn from the seed at the start of training"
+FIRST_STEP = "after the first step of training, the earliest that is recorded"
 
 
-class Start(NamedTuple):
-    """A model as it began, and how that is known, to be said in a caption."""
+class InitialModel(NamedTuple):
+    """A model at the start of its training.
+
+    Attributes:
+        model: the model.
+        origin: how its parameters are known: ``DRAWN`` or ``FIRST_STEP``, for captions.
+    """
 
     model: VoxelModel
-    said: str
+    origin: str
 
 
-def start_of(result: SeedResult, trained: VoxelModel) -> Start | None:
-    """The model that one training began with.
+def initial_model(result: SeedResult, trained: VoxelModel) -> InitialModel | None:
+    """The model at the start of one training; None if it is unknown.
 
-    The numbers of the thesis' protocol follow from the seed alone and are drawn again. Those of a
-    search, and of a start that looks at the data, are not: there the first row of the history
-    stands for them. None where neither is known.
+    Initial parameters of the thesis protocol follow from the seed alone and are drawn again. Those
+    of a search, or of an initialisation that uses the data, cannot be drawn again: the first row of
+    the training history is used instead.
 
     Args:
-        trained: what came out, whose kernel size the start is sampled at.
+        result: the training.
+        trained: the trained model; the kernels of the initial model are sampled at its size.
     """
     from scenenet.models.factory import new_model
     from scenenet.models.geneo_model import GeneoModel
@@ -46,7 +52,7 @@ def start_of(result: SeedResult, trained: VoxelModel) -> Start | None:
         drawn = new_model(settings, result.seed)
         if isinstance(drawn, SceneNet):
             drawn = drawn.with_kernel_size(trained.kernel_size)
-        return Start(drawn, DRAWN)
+        return InitialModel(drawn, DRAWN)
     if not isinstance(trained, GeneoModel) or result.history is None or result.history.empty:
         return None
     names = parameter_columns(result.history)
@@ -56,11 +62,11 @@ def start_of(result: SeedResult, trained: VoxelModel) -> Start | None:
         return None
     first = copy.deepcopy(trained)
     first.set_shape_parameters({name: numbers[name] for name in known})
-    return Start(first, FIRST_STEP)
+    return InitialModel(first, FIRST_STEP)
 
 
 def _settings(result: SeedResult) -> ModelSettings | None:
-    """What a model was trained with; None where the record of it does not say."""
+    """The settings of a training; None if its record has none."""
     recorded = (result.provenance or {}).get("settings", {})
     try:
         return ModelSettings(**recorded)

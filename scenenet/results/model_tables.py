@@ -1,4 +1,4 @@
-"""Tables of what models are: times, numbers in metres, certificates (thesis 5.2.2, 5.2.6, 3.4).
+"""Tables about models: times, parameters in metres, certificates (thesis 5.2.2, 5.2.6, 3.4).
 
 As in ``scenenet.results.tables``: every function returns a data frame for one CSV, and spread is
 the sample standard deviation over seeds.
@@ -9,30 +9,28 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import pandas as pd
+
 from scenenet.experiments.published import Thesis
 from scenenet.interpretability.parameter_sentences import Parameter, parameters_of, sentences
 from scenenet.results.folder import BOOSTED_TREES, Results
-from scenenet.results.initial_models import start_of
+from scenenet.results.initial_models import initial_model
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from scenenet.models.geneo_model import GeneoModel
 
 SYMBOLS = {"sigma": "σ", "beta": "β", "omega": "ω", "lambda": "λ"}
-"""Names of parameters -> how the thesis writes them."""
+"""Name of a parameter -> its symbol in the thesis."""
 
 
 def times(results: Results, thesis: Thesis) -> pd.DataFrame:
-    """Time and memory of training and of inference (thesis 5.2.6), whatever machine this ran on.
+    """Time and memory of training and of inference (thesis 5.2.6) on the machine of the run.
 
-    ``useful_seconds`` is the time until a training that detects anything can be expected: that of
-    one training over the share of them that do. ``inference_ms`` is of 64^3 voxels and
+    ``useful_seconds`` is the expected time until a training gives a live model: the time of one
+    training divided by the share of live models. ``inference_ms`` is of 64^3 voxels and
     ``inference_ms_128`` of 128^3 (``scenenet.evaluation.inference_time``), ``peak_memory_mb`` the
     largest over the seeds (``scenenet.core.peak_memory``).
     """
-    import pandas as pd
-
     columns = ["model", "n_seeds", "epochs", "training_seconds", "training_seconds_std",
                "seconds_per_epoch", "live_share", "useful_seconds", "peak_memory_mb",
                "inference_ms", "inference_ms_128", "thesis_training_seconds",
@@ -64,14 +62,12 @@ def times(results: Results, thesis: Thesis) -> pd.DataFrame:
 
 
 def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
-    """The numbers of each SCENE-Net after training in metres, each with a sentence (Figure 5.5).
+    """The parameters of each SCENE-Net in metres, each with a sentence (Figure 5.5).
 
-    Numbers of kernels in voxels are multiplied by the voxel size that each was trained on.
-    ``initial`` is the mean of what the seeds began with, ``initial_from`` how that is known
+    Parameters in voxels are multiplied by the voxel size of the training. ``initial`` is the mean
+    of the initial values over the seeds, ``initial_from`` says how they are known
     (``scenenet.results.initial_models``).
     """
-    import pandas as pd
-
     from scenenet.geneo.sentences import Surroundings
 
     columns = ["model", "parameter", "symbol", "unit", "mean", "std", "n_seeds", "initial",
@@ -82,8 +78,8 @@ def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
         if found is None:
             continue
         means = found.after.mean()
-        beside = Surroundings(found.step, _tower_width(results))
-        said = sentences(found.network, means.to_dict(), beside)
+        surroundings = Surroundings(found.step, _tower_width(results))
+        texts = sentences(found.network, means.to_dict(), surroundings)
         for parameter in found.parameters:
             name = parameter.name
             rows.append(
@@ -98,22 +94,22 @@ def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
                     "initial": found.before[name].mean() if name in found.before else None,
                     "initial_from": found.began,
                     "thesis": _scaled(_published(thesis, name), 0.01),
-                    "sentence": said[name],
+                    "sentence": texts[name],
                 }
             )
     return pd.DataFrame(rows, columns=columns)
 
 
 class Numbers(NamedTuple):
-    """The numbers of a SCENE-Net from every seed, in metres.
+    """The parameters of a SCENE-Net from every seed, in metres.
 
     Attributes:
         network: one of the trained models.
-        parameters: names and units, in their order.
-        after: a row a seed, a column a parameter.
-        before: the same at the start; no columns where nobody knows it.
+        parameters: names and units, in order.
+        after: trained values, a row per seed and a column per parameter.
+        before: the same for the initial models; no columns if they are unknown.
         began: how ``before`` is known.
-        step: m, what the height of a kernel is counted in.
+        step: m, unit of the height of a kernel.
     """
 
     network: GeneoModel
@@ -125,9 +121,7 @@ class Numbers(NamedTuple):
 
 
 def numbers_in_metres(results: Results, model: str) -> Numbers | None:
-    """The numbers of one SCENE-Net; None where it has no tuned file, or is none."""
-    import pandas as pd
-
+    """The parameters of one SCENE-Net; None if it has no tuned file or is not a SCENE-Net."""
     from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
 
@@ -140,15 +134,15 @@ def numbers_in_metres(results: Results, model: str) -> Numbers | None:
         network, known = trained, parameters_of(trained, card.voxel_size)
         after.append(_scaled_all(known, trained.shape_parameters()))
         sizes.append(card.voxel_size)
-        start = start_of(result, trained)
+        start = initial_model(result, trained)
         if start is not None and isinstance(start.model, GeneoModel):
             before.append(_scaled_all(known, start.model.shape_parameters()))
-            began.add(start.said)
+            began.add(start.origin)
     if network is None:
         return None
     step = network.length_unit_m(sum(sizes) / len(sizes))
-    said = "; ".join(sorted(began))
-    return Numbers(network, known, pd.DataFrame(after), pd.DataFrame(before), said, step)
+    origins = "; ".join(sorted(began))
+    return Numbers(network, known, pd.DataFrame(after), pd.DataFrame(before), origins, step)
 
 
 def _scaled_all(known: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, float]:
@@ -156,12 +150,10 @@ def _scaled_all(known: Sequence[Parameter], values: Mapping[str, float]) -> dict
 
 
 def certificate(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
-    """Which promises of a GENEO each model that predicts keeps, one row per property.
+    """Which properties of a GENEO the best seed of each model has, one row per property.
 
-    ``value`` is the number that goes with the property, ``found`` says it in words.
+    ``value`` is the measured number, ``found`` the result in words.
     """
-    import pandas as pd
-
     columns = ["model", "kind", "seed", "property", "thesis", "holds", "value", "found"]
     rows = []
     for model in results.models:
@@ -180,10 +172,8 @@ def certificate(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
 
 
 def turns(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
-    """How far the answers of each model move when the scene is turned about z, or shifted by half a
-    voxel (``degrees`` empty), one row per turn."""
-    import pandas as pd
-
+    """Change of the output of each model when the scene is rotated about z, or shifted by half a
+    voxel (``degrees`` empty); one row per rotation."""
     columns = ["model", "degrees", "mean_h", "mean_m", "largest_m", "decided_otherwise"]
     rows = []
     for model in results.models:
@@ -194,8 +184,6 @@ def turns(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
 
 
 def _training(seconds: Sequence[float], live_share: float) -> dict[str, Any]:
-    import pandas as pd
-
     each = pd.Series(seconds, dtype=float)
     return {
         "n_seeds": len(each),
@@ -220,13 +208,11 @@ def _scaled(value: float | None, factor: float) -> float | None:
 
 
 def _published(thesis: Thesis, parameter: str) -> float | None:
-    """The thesis' number in per cent; only mixing weights have one."""
+    """The published value in per cent; only mixing weights have one."""
     return thesis.value(f"parameters.{parameter.replace('.', '_')}")
 
 
 def _tower_width(results: Results) -> float | None:
     """Mean width of the labelled towers, m."""
-    import pandas as pd
-
     tables = [table for table in results.towers().values() if len(table)]
     return float(pd.concat(tables)["width"].mean()) if tables else None

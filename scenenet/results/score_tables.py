@@ -3,32 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from scenenet.experiments.published import Published, Thesis
+from scenenet.metrics.score_columns import (
+    AT_TAU,
+    MATCH_SCORES,
+    PUBLISHED_SCORES,
+    SCORES,
+    TOWER_ONLY_SCORES,
+    WHOLE_TOWERS,
+)
 from scenenet.results.folder import BOOSTED_TREES, Results, SeedResult
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-
-SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
-
-
 TRIVIAL = "nothing detected"
-"""Name of the trivial baseline, a model that never says tower, where others have theirs."""
-
-
-REACH_TAU, WHOLE_TOWERS = "reach tau", "of whole towers"
-"""Which voxels a model calls a tower's."""
+"""Name of the trivial baseline, a model that never predicts tower."""
 
 
 def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
     """One row per model and seed: test scores, tower scores, tau and training time."""
-    import pandas as pd
-
     columns = ["model", "seed", "alive", "tau", "validation_f05", *SCORES, "average_precision",
-               *(f"tower_{name}" for name in TOWER_SCORES), "epochs",
+               *(f"tower_{name}" for name in MATCH_SCORES), "epochs",
                "training_seconds"]  # fmt: skip
     rows = []
     for result in results.trained:
@@ -42,7 +38,7 @@ def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
                 result.validation.get("f05"),
                 *(voxel[name] for name in SCORES),
                 result.evaluation.get("average_precision"),
-                *(tower[name] for name in TOWER_SCORES),
+                *(tower[name] for name in MATCH_SCORES),
                 result.epochs,
                 result.seconds,
             )
@@ -51,20 +47,17 @@ def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
 
 
 def models(results: Results, thesis: Thesis) -> pd.DataFrame:
-    """Table 5.3: voxel scores on the test crops, the thesis' beside, and the trivial baseline.
+    """Table 5.3: voxel scores on the test crops, with those of the thesis and a trivial baseline.
 
-    Up to three rows per model tell which trainings were counted: ``all seeds``, ``live seeds``
-    (those that detect anything; only where some do not) and the one that is best on validation,
-    which is the one that predicts. The thesis counts useful trainings only (5.2.6). The boosted
-    trees (``scenenet.baselines.boosted_trees``) were trained, tuned and scored on the same crops.
-    ``voxels`` says which the model calls a tower's: those that reach tau, or those of whole towers
-    (docs/method/detection.md).
+    Column ``counted`` names the trainings of a row: ``all seeds``, ``live seeds`` (only if some
+    models are dead), or the seed that is best on validation, which classifies surveys. The thesis
+    reports live models only (5.2.6). The boosted trees (``scenenet.baselines.boosted_trees``) are
+    trained, tuned and scored on the same crops. Column ``voxels`` says which voxels count as
+    detected: ``AT_TAU`` or ``WHOLE_TOWERS`` (docs/method/detection.md).
     """
-    import pandas as pd
-
     columns = ["model", "counted", "voxels", "n_seeds", "live_share", "parameters"]
     columns += [f"{name}{part}" for name in SCORES for part in ("", "_std")]
-    for name in ("precision", "recall", "miou"):
+    for name in PUBLISHED_SCORES:
         columns += [f"thesis_{name}", f"thesis_{name}_std"]
     rows = []
     for model, kind in results.models.items():
@@ -73,7 +66,7 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
             row = {
                 "model": model,
                 "counted": counted,
-                "voxels": WHOLE_TOWERS if _says_towers(group) else REACH_TAU,
+                "voxels": WHOLE_TOWERS if _counts_whole_towers(group) else AT_TAU,
                 "n_seeds": len(group),
                 "live_share": sum(r.alive for r in trained) / len(trained),
                 "parameters": n_parameters(group[0]),
@@ -86,7 +79,7 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
         row = {
             "model": BOOSTED_TREES,
             "counted": "all seeds",
-            "voxels": REACH_TAU,
+            "voxels": AT_TAU,
             "n_seeds": len(group),
             "live_share": sum(r.alive for r in group) / len(group),
             "parameters": round(sum(r.evaluation["parameters"] for r in group) / len(group)),
@@ -100,15 +93,16 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
 
 
 def whole_towers(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
-    """Scores of the voxels that reach tau beside those of whole towers that are found with them
-    (docs/method/detection.md): a row per model, mean and spread over all seeds, boosted trees
-    included."""
-    import pandas as pd
+    """Scores of the voxels at or above tau, and of the voxels of whole towers.
 
+    One row per model, the boosted trees included: mean and spread over all seeds
+    (docs/method/detection.md).
+    """
     parts = {"tau": "voxel_observer", "towers": "voxel_towers"}
-    names = ("precision", "recall", "f05", "iou_tower")
     columns = ["model", "n_seeds"]
-    columns += [f"{part}_{n}{end}" for part in parts for n in names for end in ("", "_std")]
+    columns += [
+        f"{part}_{n}{end}" for part in parts for n in TOWER_ONLY_SCORES for end in ("", "_std")
+    ]
     groups = {model: results.of_model(model) for model in results.models}
     rows = []
     for model, group in (groups | {BOOSTED_TREES: results.boosted_trees}).items():
@@ -116,35 +110,30 @@ def whole_towers(results: Results, thesis: Thesis | None = None) -> pd.DataFrame
             continue
         row: dict[str, object] = {"model": model, "n_seeds": len(group)}
         for part, of in parts.items():
-            found = _mean_and_std(group, of, names)
+            found = _mean_and_std(group, of, TOWER_ONLY_SCORES)
             row |= {f"{part}_{name}": value for name, value in found.items()}
         rows.append(row)
     return pd.DataFrame(rows, columns=columns)
 
 
-def _says_towers(group: list[SeedResult]) -> bool:
+def _counts_whole_towers(group: list[SeedResult]) -> bool:
     return bool(group[0].evaluation["whole_towers"])
 
 
 def tower_scores(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
-    """Predicted towers against true ones on the test crops, mean and spread over seeds."""
-    import pandas as pd
-
+    """Predicted towers matched with labelled ones on the test crops: mean and spread over seeds."""
     columns = ["model", "counted", "n_seeds"]
-    columns += [f"{name}{part}" for name in TOWER_SCORES for part in ("", "_std")]
+    columns += [f"{name}{part}" for name in MATCH_SCORES for part in ("", "_std")]
     rows = []
     for model in results.models:
         for counted, group in _counted(results.of_model(model), results.champion(model)):
             row = {"model": model, "counted": counted, "n_seeds": len(group)}
-            rows.append(row | _mean_and_std(group, "towers", TOWER_SCORES))
+            rows.append(row | _mean_and_std(group, "towers", MATCH_SCORES))
     return pd.DataFrame(rows, columns=columns)
 
 
-TOWER_SCORES = ("precision", "recall", "median_error_m", "n_true", "n_predicted")
-
-
 def n_parameters(result: SeedResult) -> int | None:
-    """Trained numbers of a model, counted in its file; None where there is no file."""
+    """Number of trained parameters of a model, counted in its file; None without a file."""
     if not result.model_files:
         return None
     from scenenet.models.model_file import read_model
@@ -169,8 +158,6 @@ def _counted(
 def _mean_and_std(
     group: list[SeedResult], part: str, names: Iterable[str]
 ) -> dict[str, float | None]:
-    import pandas as pd
-
     summary: dict[str, float | None] = {}
     for name in names:
         values = pd.Series([r.evaluation[part][name] for r in group], dtype=float)
@@ -180,7 +167,7 @@ def _mean_and_std(
 
 def _published_scores(thesis: Thesis, kind: str) -> dict[str, float | None]:
     scores: dict[str, float | None] = {}
-    for name in ("precision", "recall", "miou"):
+    for name in PUBLISHED_SCORES:
         number = thesis.number(f"models.{kind}.{name}") or Published(place="")
         scores |= {f"thesis_{name}": number.value, f"thesis_{name}_std": number.spread}
     return scores

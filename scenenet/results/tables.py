@@ -1,57 +1,91 @@
-"""The tables of thesis chapter 5 from result files, the thesis' numbers beside ours.
+"""The tables of thesis chapter 5, made from result files, with the numbers of the thesis.
 
-Every function returns a data frame for one CSV. A table for which a run has left nothing (no
-survey was checked) keeps its columns and has no rows. Spread is always the sample
-standard deviation over seeds, empty for a single seed.
+Every function returns a data frame for one CSV file. If a run has no results for a table (no survey
+was checked), the table keeps its columns and has no rows. Spread is always the sample standard
+deviation over seeds, empty for a single seed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import NamedTuple
+
+import pandas as pd
 
 from scenenet.core.files import atomic
 from scenenet.experiments.published import Thesis
-from scenenet.experiments.registry import EXPERIMENT_TABLES
+from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.experiments.studies.summary import summarise
+from scenenet.metrics.score_columns import SCORES
+from scenenet.results.dataset_tables import classes, towers, voxelisation
 from scenenet.results.folder import Results
 from scenenet.results.model_tables import certificate, parameters, times, turns
-
-if TYPE_CHECKING:
-    import pandas as pd
-from scenenet.results.dataset_tables import classes, towers, voxelisation
 from scenenet.results.score_tables import models, seeds, tower_scores, whole_towers
 
-TABLES: Mapping[str, Callable[[Results, Thesis], pd.DataFrame]] = {
-    "classes": classes,
-    "towers": towers,
-    "voxelisation": voxelisation,
-    "models": models,
-    "seeds": seeds,
-    "whole_towers": whole_towers,
-    "tower_scores": tower_scores,
-    "times": times,
-    "parameters": parameters,
-    "certificate": certificate,
-    "certificate_turns": turns,
+
+class Table(NamedTuple):
+    """A table of every run.
+
+    Attributes:
+        title: a few words.
+        section: section of the report that it belongs to.
+        make: the table of a result folder.
+    """
+
+    title: str
+    section: str
+    make: Callable[[Results, Thesis], pd.DataFrame]
+
+
+TABLES: Mapping[str, Table] = {
+    "classes": Table("Points of each class", "data", classes),
+    "towers": Table("Labelled towers", "data", towers),
+    "voxelisation": Table("Voxelisation", "data", voxelisation),
+    "models": Table("Scores of each model", "models", models),
+    "seeds": Table("Scores of each seed", "models", seeds),
+    "whole_towers": Table("Voxels at or above tau, and whole towers", "models", whole_towers),
+    "tower_scores": Table("Towers found", "models", tower_scores),
+    "times": Table("Times", "models", times),
+    "parameters": Table("Learned parameters in metres", "learned", parameters),
+    "certificate": Table("Verified properties", "learned", certificate),
+    "certificate_turns": Table("Change of the output under rotation", "learned", turns),
 }
-"""Every table by the stem of its file. A new one is added here and the report finds it."""
+"""Every table by the stem of its file; the workflow writes and shows all of them."""
+
+COMPARISON = "thesis_and_ours"
+"""Stem of the table of ``scenenet.results.thesis_comparison``."""
+
+
+def table_titles() -> dict[str, tuple[str, str]]:
+    """Stem of each table, those of the experiments included -> its title and its section."""
+    titles = {name: (table.title, table.section) for name, table in TABLES.items()}
+    titles[COMPARISON] = ("Thesis and this run", "models")
+    return titles | {name: (one.title, one.section) for name, one in EXPERIMENTS.items()}
 
 
 def write_tables(
     results: Results, thesis: Thesis, out: str | Path, names: Iterable[str] = tuple(TABLES)
 ) -> list[Path]:
-    """Write the tables called ``names`` as ``out/NAME.csv``, those of the studies as
-    ``out/study-NAME.csv`` and those of the experiments by their names."""
-    made = {name: TABLES[name](results, thesis) for name in names}
+    """Write tables as CSV files.
+
+    Args:
+        results: the result folder.
+        thesis: published numbers.
+        out: folder to write to.
+        names: stems of ``TABLES``. The tables of the studies (``study-NAME.csv``) and of the
+            experiments are always written.
+
+    Returns:
+        the files.
+    """
+    made = {name: TABLES[name].make(results, thesis) for name in names}
     for study in results.studies:
         runs = results.study_runs(study.name)
         if runs is not None:
             made[f"study-{study.name}"] = summarise(study, runs, thesis)
-    for experiment in results.experiments:
-        runs = results.experiment_runs(experiment)
-        made[experiment] = EXPERIMENT_TABLES[experiment](runs)
+    for name in results.experiments:
+        made[name] = EXPERIMENTS[name].summarise(results.experiment_runs(name))
     paths = []
     for name, table in made.items():
         path = Path(out) / f"{name}.csv"
@@ -68,13 +102,10 @@ def print_scores(folder: str | Path, dataset: str, grid: str) -> None:
         folder: the result folder.
         dataset, grid: what the scores are of, for the heading.
     """
-    import pandas as pd
-
     file = Path(folder) / "tables" / "models.csv"
     if not file.exists():
         return
-    columns = ["model", "counted", "precision", "recall", "f05", "iou_tower", "miou"]
-    scores = pd.read_csv(file)[columns]
+    scores = pd.read_csv(file)[["model", "counted", *SCORES]]
     print(f"\nScores on the test crops of {dataset}, {grid}, tower voxels:")
     print(scores.to_string(index=False, float_format="%.3f", na_rep="-"))
     print(f"Report: {folder}/report/index.html")

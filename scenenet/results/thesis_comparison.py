@@ -1,21 +1,21 @@
-"""Every published number beside ours, and whether it was reproduced."""
+"""Every published number compared with the number of this run."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from scenenet.core.files import atomic
 from scenenet.experiments.published import Published, Thesis
 from scenenet.experiments.studies.findings import as_good_as_best
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.experiments.studies.summary import summarise
+from scenenet.metrics.score_columns import PUBLISHED_SCORES
 from scenenet.results import tables
 from scenenet.results.folder import Results, SeedResult
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 COLUMNS = ("name", "place", "what", "unit", "thesis", "spread", "low", "high", "ours", "verdict",
            "remark")  # fmt: skip
@@ -23,32 +23,37 @@ COLUMNS = ("name", "place", "what", "unit", "thesis", "spread", "low", "high", "
 REPRODUCED, BETTER, NOT, UNMEASURED = "reproduced", "better", "not", "not measured"
 
 SCORE_TOLERANCE = 0.05
-"""Scores this near are the same: the thesis' own spread over seeds is up to 0.08."""
+"""Scores within this difference are equal; the spread over seeds in the thesis is up to 0.08."""
 TOLERANCE = 0.2
-"""Other numbers are the same within a fifth."""
+"""Other numbers are equal within this relative difference."""
+
+SCORE_ENDINGS = tuple(f".{name}" for name in PUBLISHED_SCORES)
+"""Endings of the names of published scores."""
 
 REMARKS: Mapping[str, str] = {
-    "data.": "These are the data of the thesis; ours are named in the section on the surveys.",
-    "class_share.": "The shares are those of other land, and labels of crops are coded otherwise "
-    "than Table 5.1 says (docs/method/synthetic.md).",
-    "towers.": "The lines are others: the public crops show poles of 10-20 m, the thesis' "
-    "statistics pylons.",
-    "voxelisation.": "Time on the machine this ran on; counted without sorting.",
-    "protocol.epochs_needed": "The fewest epochs whose F0.5 is not told apart from the best one's; "
-    "an epoch has fewer steps here.",
-    "protocol.crops_needed": "The fewest training crops whose F0.5 is not told apart from the best "
-    "one's, of those there are.",
-    "protocol.": "A setting, and not a result: chosen for other and fewer crops.",
-    "parameters.": "Weights of runs are comparable only as far as the kernels' values are.",
-    "models.": "Other and fewer crops than the thesis had.",
-    "times.": "Time on the machine this ran on, with other and fewer crops.",
-    "kernel_size.": "Other and fewer crops than the thesis had.",
-    "ablation.": "Other and fewer crops than the thesis had.",
-    "starts.": "Other and fewer crops than the thesis had.",
-    "measurement.": "Measured by F0.5 here, by the loss in the thesis.",
+    "data.": "A number of the data of the thesis; the section on the surveys describes the data "
+    "of this run.",
+    "class_share.": "Other land, and the labels of the crops use other codes than Table 5.1 "
+    "(docs/method/synthetic.md).",
+    "towers.": "Other lines: the public crops have poles of 10 to 20 m, the statistics of the "
+    "thesis are of pylons.",
+    "voxelisation.": "Time on the machine of this run; points are counted without sorting.",
+    "protocol.epochs_needed": "The fewest epochs with an F0.5 equal to the best within the spread "
+    "over seeds; an epoch has fewer steps in this run.",
+    "protocol.crops_needed": "The fewest training crops, of the numbers tried, with an F0.5 "
+    "equal to the best within the spread over seeds.",
+    "protocol.": "A setting and not a result, chosen for other and fewer crops.",
+    "parameters.": "Weights of two runs can be compared only if the values of their kernels are "
+    "similar.",
+    "models.": "Other and fewer crops than in the thesis.",
+    "times.": "Time on the machine of this run, with other and fewer crops.",
+    "kernel_size.": "Other and fewer crops than in the thesis.",
+    "ablation.": "Other and fewer crops than in the thesis.",
+    "starts.": "Other and fewer crops than in the thesis.",
+    "measurement.": "Measured by F0.5 in this run, by the loss in the thesis.",
     "loss.": "Depends on the data and on the weights f_w.",
 }
-"""Why a number of ours is another one, by the beginning of its name."""
+"""Why a number differs from the published one, by the beginning of its name."""
 
 
 def compare(results: Results, thesis: Thesis) -> pd.DataFrame:
@@ -58,8 +63,6 @@ def compare(results: Results, thesis: Thesis) -> pd.DataFrame:
     higher score, a shorter time), ``not``, or ``not measured``; every row that is neither of the
     first two has a ``remark``.
     """
-    import pandas as pd
-
     ours = _ours(results, thesis)
     rows = []
     for name, number in thesis.numbers.items():
@@ -83,10 +86,10 @@ def _verdict(name: str, number: Published, ours: float | None) -> str:
     if name.startswith(("times.", "voxelisation.")):
         bound = number.value if number.value is not None else number.high
         assert bound is not None, name
-        # A time saved is below zero, and better the further it is.
+        # A negative bound is a time saved: the lower, the better.
         better = bound / (1 + TOLERANCE) if bound > 0 else bound * (1 + TOLERANCE)
         return BETTER if ours < better else _near(number, ours)
-    if name.endswith((".precision", ".recall", ".miou")) and not name.startswith("models.lift"):
+    if name.endswith(SCORE_ENDINGS) and not name.startswith("models.lift"):
         assert number.value is not None, name
         if ours > number.value + SCORE_TOLERANCE:
             return BETTER
@@ -109,11 +112,11 @@ def _near(number: Published, ours: float) -> str:
 
 
 def _remark(name: str) -> str:
-    return next((said for start, said in REMARKS.items() if name.startswith(start)), "")
+    return next((text for start, text in REMARKS.items() if name.startswith(start)), "")
 
 
 def _ours(results: Results, thesis: Thesis) -> dict[str, float | None]:
-    """Our number for each name that this run has one for."""
+    """The number of this run for each published name, if it has one."""
     found: dict[str, float | None] = {}
     for gather in (_of_data, _of_settings, _of_models, _of_times, _of_studies):
         found |= gather(results, thesis)
@@ -148,7 +151,7 @@ SETTINGS: Mapping[str, str] = {
     "rho_l": "training.loss.rho_mixing",
     "rho_t": "training.loss.rho_shape",
 }
-"""Published settings -> ours, of the model that speaks for SCENE-Net."""
+"""Published setting -> setting of the model that represents SCENE-Net."""
 
 
 def _of_settings(results: Results, thesis: Thesis) -> dict[str, float | None]:
@@ -169,14 +172,12 @@ def _of_settings(results: Results, thesis: Thesis) -> dict[str, float | None]:
 
 
 def _settings(trained: SeedResult) -> Mapping[str, Any]:
-    """What a model was trained with, as far as its provenance says."""
+    """The settings of a training; empty if its record has none."""
     return (trained.provenance or {}).get("settings") or {}
 
 
 def _of_models(results: Results, thesis: Thesis) -> dict[str, float | None]:
-    """The first model of each architecture speaks for it: its mean over all seeds."""
-    import pandas as pd
-
+    """Each architecture is represented by its first model, with the mean over all seeds."""
     found: dict[str, float | None] = {}
     every = tables.models(results, thesis)
     for kind in ("scenenet", "cnn"):
@@ -185,7 +186,7 @@ def _of_models(results: Results, thesis: Thesis) -> dict[str, float | None]:
         if rows.empty:
             continue
         row = rows.iloc[0]
-        for score in ("precision", "recall", "miou"):
+        for score in PUBLISHED_SCORES:
             found[f"models.{kind}.{score}"] = float(row[score])
         found[f"models.{kind}.alive_share"] = 100 * float(row["live_share"])
         if pd.notna(row["parameters"]):
@@ -198,10 +199,10 @@ def _of_models(results: Results, thesis: Thesis) -> dict[str, float | None]:
             ]
             if weights:
                 found["parameters.lambda_negative_sphere"] = 100 * sum(weights) / len(weights)
-    for score in ("precision", "recall", "miou"):
-        ours, theirs = (found.get(f"models.{kind}.{score}") for kind in ("scenenet", "cnn"))
-        if ours is not None and theirs is not None:
-            found[f"models.lift.{score}"] = 100 * (ours - theirs)
+    for score in PUBLISHED_SCORES:
+        scenenet, cnn = (found.get(f"models.{kind}.{score}") for kind in ("scenenet", "cnn"))
+        if scenenet is not None and cnn is not None:
+            found[f"models.lift.{score}"] = 100 * (scenenet - cnn)
     return found
 
 
@@ -220,14 +221,14 @@ def _of_times(results: Results, thesis: Thesis) -> dict[str, float | None]:
             found |= {"times.training": minutes, "times.training_bound": minutes}
         found[f"times.{kind}.inference"] = float(row["inference_ms"])
         found[f"times.{kind}.training_useful"] = float(row["useful_seconds"]) / 3600
-    ours, theirs = (found.get(f"times.{kind}.inference") for kind in ("scenenet", "cnn"))
-    if ours is not None and theirs is not None:
-        found["times.lift.inference"] = ours - theirs
+    scenenet, cnn = (found.get(f"times.{kind}.inference") for kind in ("scenenet", "cnn"))
+    if scenenet is not None and cnn is not None:
+        found["times.lift.inference"] = scenenet - cnn
     return found
 
 
 def _first(results: Results, kind: str) -> str | None:
-    """The first model of an architecture, one of the thesis' protocol if there is one."""
+    """The first model of an architecture, preferably one of the thesis protocol."""
     names = [model for model, k in results.models.items() if k == kind]
     for name in names:
         trained = results.of_model(name)
@@ -246,7 +247,7 @@ def _of_studies(results: Results, thesis: Thesis) -> dict[str, float | None]:
         for variant in study.all_variants():
             row = summary.loc[variant.name]
             if variant.thesis:
-                for score in ("precision", "recall", "miou"):
+                for score in PUBLISHED_SCORES:
                     found[f"{variant.thesis}.{score}"] = float(row[score])
                 found[f"{variant.thesis}.alive_share"] = 100 * float(row["live_share"])
         if study.name == "alpha-epsilon":

@@ -1,5 +1,8 @@
-"""An experiment as an MLflow experiment of its own: a parent for each model and case, and a run for
-each seed, with the same names of metrics."""
+"""An experiment of ``scenenet.experiments`` as an MLflow experiment of its own.
+
+Each case (a model, at a level of noise or with a way to count) is a parent run, with a nested run
+for each training. Parents and nested runs have metrics of the same names.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +11,19 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas as pd
 
-from scenenet.experiments.cross_validation.summary import SCORES, summarise_folds
+from scenenet.experiments.cross_validation.summary import CASE, case_name, summarise_folds
 from scenenet.experiments.label_noise.settings import LABELS
-from scenenet.tracking.model_runs import origin_tags
+from scenenet.experiments.registry import EXPERIMENTS
+from scenenet.metrics.score_columns import SCORES
+from scenenet.tracking.model_runs import data_of, origin_tags
 from scenenet.tracking.run_log import NOTE_TAG, RunGroup, RunRecord
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from scenenet.figures import Picture
 
-NOT_METRICS = ("seed", "model", "level", "fold", "crops")
+NOT_METRICS = ("seed", "model", "voxels", "level", "fold", "crops")
 
 
 @dataclass(frozen=True)
@@ -27,9 +31,9 @@ class Origin:
     """What all runs of an experiment share.
 
     Attributes:
-        dataset: name of the data, part of every key, so that runs of other data stand beside.
-        tags: what they were made from and by.
-        pictures: figures of the whole experiment, attached to every parent.
+        dataset: name of the data; part of every key, so that runs on other data are kept.
+        tags: fingerprints of the data, the settings and the code.
+        pictures: figures of the experiment, attached to every parent.
     """
 
     dataset: str
@@ -39,60 +43,87 @@ class Origin:
 
 def origin_of(
     dataset: str,
-    gathered: Mapping[str, Any],
+    joined: Mapping[str, Any],
     job: Mapping[str, Any],
     pictures: Sequence[Picture] = (),
 ) -> Origin:
-    """What the runs share, from the record of the gathered table and that of one of its jobs: the
-    settings and the code are those of the jobs, the data those of all of them."""
-    return Origin(dataset, origin_tags({**job, "inputs": gathered.get("inputs", {})}), pictures)
+    """The origin of the runs of an experiment.
+
+    Args:
+        dataset: name of the data.
+        joined: provenance record of the table of all runs; the data are taken from it.
+        job: provenance record of one of the jobs; all have the same settings and code.
+        pictures: figures of the experiment.
+    """
+    return Origin(dataset, origin_tags({**job, "inputs": joined.get("inputs", {})}), pictures)
 
 
-def noise_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
-    """The runs of the noise study.
+def experiment_note(name: str) -> str:
+    """The description of the MLflow experiment of an experiment."""
+    experiment = EXPERIMENTS[name]
+    return f"{experiment.title}. {experiment.contents} Thesis {experiment.place}."
+
+
+def label_noise_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
+    """The runs of the label noise experiment: a parent for each level and model, a run per seed.
 
     Args:
         runs: of ``scenenet.experiments.label_noise.run``, a row per level, seed and model.
+        origin: data, settings and code of the runs.
     """
     groups = []
     for (level, model), rows in runs.groupby(["level", "model"], sort=False):
-        told = (
-            f"F0.5 and more of the labels themselves, {level:.0%} of them wrong, as if they were "
-            "the answer of a model."
+        description = (
+            f"Scores of the labels themselves as if a model had predicted them; {level:.0%} of the "
+            "tower points are mislabelled."
             if model == LABELS
-            else f"Trained on labels of which {level:.0%} are wrong; labels_ is against such "
-            "labels, truth_ against the truth."
+            else f"Trained with {level:.0%} of the tower points mislabelled. `labels_`: compared "
+            "with labels of the same quality; `truth_`: compared with the truth."
         )
-        case = {"level": float(level), "model": str(model)}
         name = f"{model}, {level:.0%} wrong"
-        groups.append(group_of("label_noise", origin, name, case, rows, told, "5.2.5"))
+        case = {"level": float(level), "model": str(model)}
+        groups.append(group_of("label_noise", origin, name, case, rows, description))
     return groups
 
 
 def fold_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
-    """The runs of the cross-validation: a parent for each model, a run for each seed and fold.
+    """The runs of the cross-validation: a parent for each model and way to count, a run for each
+    seed and fold.
 
     Args:
         runs: of ``scenenet.experiments.cross_validation.run``.
+        origin: data, settings and code of the runs.
     """
-    summary = summarise_folds(runs).set_index("model")
+    summary = summarise_folds(runs).set_index(list(CASE))
     groups = []
-    for model, rows in runs.groupby("model", sort=False):
-        row = summary.loc[model]
-        told = (
-            f"Cross-validated over {row['crops']} crops in {row['n_folds']} folds. Means over "
-            "folds and seeds; spread_ is that of the mean over folds over the seeds, pooled_ of "
-            "the counts of all folds together."
+    for (model, voxels), rows in runs.groupby(list(CASE), sort=False):
+        row = summary.loc[(model, voxels)]
+        description = (
+            f"Cross-validation over {row['crops']} crops in {row['n_folds']} folds. Metrics are "
+            "means over folds and seeds; `spread_` is the standard deviation over seeds of the "
+            "mean over folds; `pooled_` is computed from the counts of all folds together."
         )
         group = group_of(
-            "cross_validation", origin, str(model), {"model": str(model)}, rows, told, "5.2.4",
+            "cross_validation",
+            origin,
+            case_name(str(model), str(voxels)),
+            {"model": str(model), "voxels": str(voxels)},
+            rows,
+            description,
             lambda row: f"seed-{row['seed']}/fold-{row['fold']}",
-        )  # fmt: skip
+        )
         more = {f"spread_{name}": _number(row[f"{name}_std"]) for name in SCORES}
         more |= {f"pooled_{name}": _number(row[f"pooled_{name}"]) for name in SCORES}
         parent = replace(group.parent, metrics={**group.parent.metrics, **more})
         groups.append(replace(group, parent=parent))
     return groups
+
+
+EXPERIMENT_GROUPS: Mapping[str, Callable[[pd.DataFrame, Origin], list[RunGroup]]] = {
+    "cross_validation": fold_groups,
+    "label_noise": label_noise_groups,
+}
+"""The MLflow runs of each experiment of ``scenenet.experiments.registry``."""
 
 
 def group_of(
@@ -101,19 +132,21 @@ def group_of(
     name: str,
     case: Mapping[str, Any],
     rows: pd.DataFrame,
-    told: str,
-    place: str,
+    description: str,
     child: Callable[[Mapping[str, Any]], str] = lambda row: f"seed-{row['seed']}",
 ) -> RunGroup:
-    """A parent with the means of its rows, and a run for each of them.
+    """A parent with the means of its rows, and a nested run for each row.
 
     Args:
+        experiment: name in ``scenenet.experiments.registry``.
+        origin: data, settings and code of the runs.
         name: of the parent, unique in the experiment.
         case: what the rows have in common; parameters of all runs.
-        told: description of the parent.
-        place: where the thesis asks for it.
-        child: what tells a row from the others.
+        rows: one per training.
+        description: of the parent.
+        child: ending of the key of a row, unique among the rows.
     """
+    place = EXPERIMENTS[experiment].place
     key = f"{experiment}/{origin.dataset}/{name}"
     tags = {"study": experiment, "dataset": origin.dataset, "place": place, **origin.tags}
     tags["model"] = str(case["model"])
@@ -130,6 +163,7 @@ def group_of(
                 params={**case, **rest},
                 metrics=metrics,
                 tags=tags | alive | {"seed": str(row["seed"])},
+                datasets=data_of(origin.dataset, tags),
                 seconds=metrics.get("training_seconds") or 0.0,
             )
         )
@@ -138,7 +172,7 @@ def group_of(
         name=name,
         params=case,
         metrics=_means(children),
-        tags=tags | {NOTE_TAG: f"{told} Mean over {len(rows)} runs. Thesis {place}."},
+        tags=tags | {NOTE_TAG: f"{description} Mean over {len(rows)} runs. Thesis {place}."},
         artifacts={f"figures/{p.file.name}": p.file for p in origin.pictures},
         seconds=sum(record.seconds for record in children),
     )
@@ -151,7 +185,7 @@ def _number(value: Any) -> float | None:
 
 
 def _means(children: Sequence[RunRecord]) -> dict[str, float | None]:
-    """Means under the names of the runs' own metrics, so that both stand in one column."""
+    """Means under the names of the metrics of the runs, so that both share a column in MLflow."""
     means: dict[str, float | None] = {"runs": len(children)}
     for name in children[0].metrics:
         values = [v for record in children if (v := record.metrics[name]) is not None]
@@ -160,17 +194,3 @@ def _means(children: Sequence[RunRecord]) -> dict[str, float | None]:
         if len(values) > 1:
             means[f"{name}_std"] = float(np.std(values, ddof=1))
     return means
-
-
-EXPERIMENT_NOTES = {
-    "cross_validation": "Every crop a test crop once, over all models and seeds.",
-    "label_noise": "Trained on labels of which a known share is wrong, scored against such labels "
-    "and against the truth. Thesis 5.2.5.",
-}
-"""The description of each experiment."""
-
-EXPERIMENT_GROUPS: Mapping[str, Callable[[pd.DataFrame, Origin], list[RunGroup]]] = {
-    "cross_validation": fold_groups,
-    "label_noise": noise_groups,
-}
-"""The runs of each experiment, by its name."""

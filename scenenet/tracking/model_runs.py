@@ -1,4 +1,4 @@
-"""What the MLflow runs of a result folder consist of."""
+"""The MLflow runs of the trainings in a result folder."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any
 
 from scenenet.core.files import digest
+from scenenet.metrics.score_columns import DECISIVE_FIRST, MATCH_SCORES, SCORES
 from scenenet.results.folder import BOOSTED_TREES, Results, SeedResult
-from scenenet.tracking.run_log import NOTE_TAG, RunGroup, RunRecord
+from scenenet.tracking.logged_model import ModelRecord
+from scenenet.tracking.run_log import NOTE_TAG, DatasetRecord, RunGroup, RunRecord
 
 if TYPE_CHECKING:
     from scenenet.figures import Picture
-
-SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
-TOWER_SCORES = ("precision", "recall", "median_error_m", "n_true", "n_predicted")
 
 
 def model_groups(
@@ -28,17 +27,18 @@ def model_groups(
     pictures: Sequence[Picture] = (),
     study: str = "reproduction",
 ) -> list[RunGroup]:
-    """One parent per model, the boosted trees among them, with a run per seed under it.
+    """One parent per model, the boosted trees included, with a nested run per seed.
 
     Args:
         results: the result folder.
-        dataset: name of the data, part of every key, so that runs on other data stand beside.
+        dataset: name of the data; part of every key, so that runs on other data are kept.
         settings: settings of each model beyond those its training recorded, by model name.
-        protocol: how the data were split and voxelised, in words, for a tag.
+        protocol: how the data were split and voxelised, for a tag.
         pictures: figures to attach to the parents of the models they show.
         study: the question the runs belong to, for a tag.
     """
     base = {"study": study, "dataset": dataset, "protocol": protocol}
+    source = (results.folder / "split" / "split.csv").as_posix()
     groups = []
     trainings = {model: results.of_model(model) for model in results.models}
     for model, trained in (trainings | {BOOSTED_TREES: results.boosted_trees}).items():
@@ -46,7 +46,7 @@ def model_groups(
             continue
         own = (settings or {}).get(model, {})
         key = f"{study}/{dataset}/{model}"
-        children = [_seed_record(result, key, base, own) for result in trained]
+        children = [_seed_record(result, key, base, own, source) for result in trained]
         shown = [picture for picture in pictures if model in picture.models]
         champion = results.champion(model) if model in trainings else None
         parent = _parent_record(trained, champion, key, base, children, shown)
@@ -68,7 +68,7 @@ def flatten(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def _seed_record(
-    result: SeedResult, group: str, base: Mapping[str, str], own: Mapping[str, Any]
+    result: SeedResult, group: str, base: Mapping[str, str], own: Mapping[str, Any], source: str
 ) -> RunRecord:
     provenance = result.provenance or {}
     history, epochs = _history(result)
@@ -89,12 +89,57 @@ def _seed_record(
         },
         artifacts={f"model/{path.name}": path for path in result.model_files},
         drawings=_drawings(result),
+        datasets=_datasets(result, base["dataset"], source),
+        model=_model(result),
         seconds=result.seconds or 0.0,
     )
 
 
+def _datasets(result: SeedResult, dataset: str, source: str) -> list[DatasetRecord]:
+    """The crops that a model was trained, tuned and tested on; ``source`` lists the parts."""
+    inputs = (result.provenance or {}).get("inputs")
+    if not inputs:
+        return []
+    fingerprint = digest(inputs)
+    tested = {"crops": result.evaluation["voxel"].get("n_samples")}
+    return [
+        DatasetRecord(f"{dataset}, training", fingerprint, source, "training"),
+        DatasetRecord(
+            f"{dataset}, validation", fingerprint, source, "validation", prefix="validation_"
+        ),
+        DatasetRecord(f"{dataset}, test", fingerprint, source, "test", tested, "test_"),
+    ]
+
+
+def data_of(
+    dataset: str, tags: Mapping[str, str], prefix: str | None = None
+) -> list[DatasetRecord]:
+    """The data of a run of a study or an experiment, whose parts differ from run to run.
+
+    Args:
+        dataset: name of the data.
+        tags: of ``origin_tags``; without them the data are unknown.
+        prefix: beginning of the names of the metrics that were measured on the data.
+    """
+    fingerprint = tags.get("scenenet.data")
+    return (
+        [DatasetRecord(dataset, fingerprint, "", "training", prefix=prefix)] if fingerprint else []
+    )
+
+
+def _model(result: SeedResult) -> ModelRecord | None:
+    if not result.model_files:
+        return None
+    tags = {"model": result.model, "kind": result.kind, "seed": str(result.seed)}
+    return ModelRecord(f"{result.model}-seed-{result.seed}", result.model_files[0], tags)
+
+
 def origin_tags(provenance: Mapping[str, Any]) -> dict[str, str]:
-    """Config hash, data fingerprint and code version, from the record of a training or a study."""
+    """Tags with the hash of the settings, the fingerprint of the data and the hash of the code.
+
+    Args:
+        provenance: record of a training, a study or an experiment; empty for no tags.
+    """
     if not provenance:
         return {}
     return {
@@ -115,12 +160,11 @@ def _history(result: SeedResult) -> tuple[dict[str, list[float]], list[int]]:
 
 def _final_metrics(result: SeedResult) -> dict[str, float | None]:
     test, towers = result.evaluation["voxel"], result.evaluation["towers"]
-    # MLflow's plots begin with the first: it is the one that the thesis chooses by.
-    scores = sorted(SCORES, key=lambda name: name != "f05")
-    metrics: dict[str, float | None] = {f"test_{name}": test[name] for name in scores}
+    metrics: dict[str, float | None] = {f"test_{name}": test[name] for name in DECISIVE_FIRST}
     metrics["test_average_precision"] = result.evaluation.get("average_precision")
-    metrics |= {f"validation_{n}": result.validation[n] for n in scores if n in result.validation}
-    metrics |= {f"towers_{name}": towers[name] for name in TOWER_SCORES}
+    validation = result.validation
+    metrics |= {f"validation_{n}": validation[n] for n in DECISIVE_FIRST if n in validation}
+    metrics |= {f"towers_{name}": towers[name] for name in MATCH_SCORES}
     metrics |= {"tau": test.get("tau"), "alive": float(result.alive)}
     return metrics
 
@@ -155,10 +199,10 @@ def _parent_record(
     children: Sequence[RunRecord],
     pictures: Sequence[Picture],
 ) -> RunRecord:
-    """Mean, spread and share of live seeds on the group, with the trivial baseline beside.
+    """Mean and spread over the seeds, share of live models, and the trivial baseline.
 
-    Charts show a group as one line, so the parent carries numbers of its own. Dead seeds count in
-    the means; ``test_f05_live_mean`` and the like leave them out.
+    MLflow draws a group as one line, so the parent needs metrics of its own. Means include dead
+    models; ``test_f05_live_mean`` and similar metrics leave them out.
     """
     live = [child for child, result in zip(children, trained, strict=True) if result.alive]
     metrics: dict[str, float | None] = {}
@@ -212,7 +256,8 @@ def _summary(
 def _note(trained: Sequence[SeedResult], n_live: int) -> str:
     seeds = "seed" if len(trained) == 1 else "seeds"
     return (
-        f"Summary over {len(trained)} {seeds}, {n_live} of which detect anything. `_mean` and "
-        "`_std` are over all of them, `_live_mean` over those that do; `trivial_` is a model that "
-        "never says tower; `champion_` is the one with the highest F0.5 on validation."
+        f"Summary over {len(trained)} {seeds}; {n_live} of the models are live (detect a tower "
+        "voxel). `_mean` and `_std` are over all seeds, `_live_mean` over live models; "
+        "`trivial_` is a model that never predicts tower; `champion_` is the seed with the "
+        "highest F0.5 on the validation crops."
     )

@@ -1,17 +1,15 @@
-"""The best of each model, and of all, in MLflow's registry under the alias ``champion``."""
+"""The best seed of each model, and of all models, in MLflow's registry with alias ``champion``."""
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from scenenet.core import files
 from scenenet.core.errors import InputError
 from scenenet.results.folder import Results, SeedResult
+from scenenet.tracking.logged_model import model_ids
 from scenenet.tracking.store import TrackingSettings, exclusive, open_client, store_errors
 
 if TYPE_CHECKING:
@@ -19,27 +17,29 @@ if TYPE_CHECKING:
     from mlflow.entities.model_registry import ModelVersion
 
 ALIAS = "champion"
-FOLDER = "served"
-"""Where a run keeps its model as it is pyfunc_model."""
 DIGEST_TAG = "scenenet.digest"
 
 
 def register_champions(
     settings: TrackingSettings, results: Results, dataset: str, runs: str | Path, record: str | Path
 ) -> dict[str, Any]:
-    """Register the seed of each model that is best on validation, and the best of all models.
+    """Register the logged model of the best seed of each model, and of the best of all models.
 
-    The registry calls a model ``EXPERIMENT-MODEL``, and the best of all ``EXPERIMENT``. Another
-    champion becomes a new version, and the alias moves to it; the same one stays as it is. Older
-    versions are kept.
+    Best means the highest F0.5 on the validation crops. The name of a model in the registry is
+    ``EXPERIMENT-MODEL``, that of the best of all ``EXPERIMENT``. A new champion becomes a new
+    version, and the alias moves to it; an unchanged one gets no new version. Older versions are
+    kept.
 
     Args:
+        settings: where the store is.
+        results: the result folder.
+        dataset: name of the data, part of the key of every run.
         runs: record of ``log_runs``, to find the run of each seed.
         record: JSON file to write: name in the registry -> model, seed, version, run, and the
-            address to load it by.
+            URI to load it with.
 
     Returns:
-        what was written.
+        the content of ``record``.
 
     Raises:
         InputError: a champion has no run in the store.
@@ -82,46 +82,27 @@ def _champions(experiment: str, results: Results) -> dict[str, SeedResult]:
 
 
 def _registered(client: MlflowClient, name: str, champion: SeedResult, run_id: str) -> ModelVersion:
-    """The version of this champion, made if it is not the current one already."""
+    """The version of this champion, created unless it is the current one."""
     from mlflow.exceptions import MlflowException
 
     digest = files.digest([files.sha256(file) for file in champion.model_files] + [run_id])
     try:
         client.get_registered_model(name)
     except MlflowException:
-        client.create_registered_model(name, description=_said())
+        client.create_registered_model(name, description=_description())
     else:
         aliases = client.get_registered_model(name).aliases
         if ALIAS in aliases:
             current = client.get_model_version(name, aliases[ALIAS])
             if current.tags.get(DIGEST_TAG) == digest:
                 return current
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
-        _save(Path(scratch) / FOLDER, champion)
-        client.log_artifacts(run_id, str(Path(scratch) / FOLDER), FOLDER)
-    source = f"{client.get_run(run_id).info.artifact_uri}/{FOLDER}"
+    (model_id,) = model_ids(client.get_run(run_id))
+    source = client.get_logged_model(model_id).artifact_location
     version = client.create_model_version(
-        name, source, run_id, tags={**_tags(champion), DIGEST_TAG: digest}
+        name, source, run_id, tags={**_tags(champion), DIGEST_TAG: digest}, model_id=model_id
     )
     client.set_registered_model_alias(name, ALIAS, version.version)
     return version
-
-
-def _save(folder: Path, champion: SeedResult) -> None:
-    import mlflow.pyfunc
-    from mlflow.models import ModelSignature
-    from mlflow.types import Schema, TensorSpec
-
-    from scenenet.tracking import pyfunc_model
-
-    grids = Schema([TensorSpec(np.dtype(np.float32), (-1, -1, -1, -1))])
-    mlflow.pyfunc.save_model(
-        folder,
-        python_model=str(pyfunc_model.__file__),
-        artifacts={"model": str(champion.model_files[0].resolve())},
-        signature=ModelSignature(inputs=grids, outputs=grids),
-        pip_requirements=["scenenet"],
-    )
 
 
 def _tags(champion: SeedResult) -> Mapping[str, str]:
@@ -133,8 +114,8 @@ def _tags(champion: SeedResult) -> Mapping[str, str]:
     }
 
 
-def _said() -> str:
+def _description() -> str:
     return (
         "Probability of each voxel of a batch of grids (B, D, H, W) to hold a tower. The version "
-        f"called {ALIAS} is the training with the highest F0.5 on validation; its tags say which."
+        f"with alias {ALIAS} is the training with the highest F0.5 on validation; see its tags."
     )

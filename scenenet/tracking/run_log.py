@@ -1,21 +1,23 @@
-"""Logging runs so that a rerun replaces its run and never adds a twin.
+"""Logging runs so that logging again replaces a run and never duplicates it.
 
-A run is known by its key (``dataset/model/seed-3``) and by a digest of everything that is logged
-in it. The same key and digest: the run stays as it is. Another digest: the new run is logged whole
-and the old one deleted.
+A run is identified by its key (``dataset/model/seed-3``) and by a digest of everything that is
+logged in it. If a run with the same key and digest exists, it stays unchanged. If the digest
+differs, the new run is logged and the old one is deleted with its logged models.
 """
 
 from __future__ import annotations
 
+import json
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenenet.core import files
 from scenenet.core.errors import InputError
+from scenenet.tracking.logged_model import ModelRecord, log_model, model_ids
 from scenenet.tracking.store import (
     TrackingSettings,
     check_same_store,
@@ -38,21 +40,44 @@ METRICS_PER_BATCH, PARAMS_PER_BATCH = 1000, 100
 
 
 @dataclass(frozen=True)
-class RunRecord:
-    """Everything one MLflow run holds.
+class DatasetRecord:
+    """Data that a run used, logged as an MLflow data set.
 
     Attributes:
-        key: what it is the run of; unique in its experiment.
-        name: the name people see.
+        name: name in MLflow; unique among the data sets of a run.
+        digest: fingerprint of the data.
+        source: file that lists the data; empty if there is none.
+        context: what the data were used for: ``training``, ``validation`` or ``test``.
+        profile: facts about the data, such as the number of crops.
+        prefix: beginning of the names of the metrics that were measured on it.
+    """
+
+    name: str
+    digest: str
+    source: str
+    context: str
+    profile: Mapping[str, Any] = field(default_factory=dict)
+    prefix: str | None = None
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """Everything that one MLflow run contains.
+
+    Attributes:
+        key: identifies the run; unique in its experiment.
+        name: name that is shown.
         params: settings; values are written as text.
         metrics: final numbers. None and NaN are left out.
         history: measure -> value of each epoch, first epoch first.
         epochs: step of each value in ``history``.
         tags: what to filter by.
         artifacts: path in the run -> the file that is copied there.
-        drawings: path in the run -> function that draws that file; what it draws must follow from
-            the rest of the record, because only the rest enters the digest.
-        seconds: how long the work took, shown as the duration of the run.
+        drawings: path in the run -> function that draws that file. The drawing must follow from the
+            rest of the record, because only the rest enters the digest.
+        datasets: data that the run used.
+        model: the model that the run trained; logged as an MLflow logged model.
+        seconds: duration of the work, shown as the duration of the run.
     """
 
     key: str
@@ -64,10 +89,12 @@ class RunRecord:
     tags: Mapping[str, str] = field(default_factory=dict)
     artifacts: Mapping[str, Path] = field(default_factory=dict)
     drawings: Mapping[str, Callable[[Path], object]] = field(default_factory=dict)
+    datasets: Sequence[DatasetRecord] = ()
+    model: ModelRecord | None = None
     seconds: float = 0.0
 
     def digest(self) -> str:
-        """Digest of all that is logged; files by their content."""
+        """Digest of everything that is logged; files by their content."""
         return files.digest(
             {
                 "name": self.name,
@@ -78,13 +105,17 @@ class RunRecord:
                 "tags": dict(self.tags),
                 "artifacts": {to: files.sha256(path) for to, path in self.artifacts.items()},
                 "drawings": sorted(self.drawings),
+                "datasets": [asdict(dataset) for dataset in self.datasets],
+                "model": None
+                if self.model is None
+                else [self.model.name, files.sha256(self.model.file), dict(self.model.tags)],
             }
         )
 
 
 @dataclass(frozen=True)
 class RunGroup:
-    """A parent run with its summary, and the runs under it."""
+    """A parent run with a summary, and the runs nested in it."""
 
     parent: RunRecord
     children: Sequence[RunRecord]
@@ -97,20 +128,20 @@ def log_runs(
     store: str | Path | None = None,
     note: str = "",
 ) -> dict[str, Any]:
-    """Bring the runs of ``groups`` into the store; what is there unchanged is not touched.
+    """Log the runs of ``groups`` to the store; unchanged runs stay as they are.
 
-    Runs of the same groups that are no longer among the results are deleted, so that a parent's
-    summary and the runs under it always tell the same. Nothing else in the store is touched.
+    Runs of the same groups that are no longer among the results are deleted, so that the summary of
+    a parent always agrees with the runs nested in it. Nothing else in the store is changed.
 
     Args:
         settings: where the store is, and the experiment.
         groups: what to log.
         record: JSON file to write: key -> run id, digest and whether it was logged or kept.
         store: the record that ``create_store`` wrote; checked against the store if given.
-        note: what the experiment says of itself.
+        note: description of the experiment.
 
     Returns:
-        what was written.
+        the content of ``record``.
 
     Raises:
         InputError: the store is not the one of the record, or as for ``create_store``.
@@ -150,7 +181,7 @@ def _log_group(client: MlflowClient, experiment: str, group: RunGroup) -> dict[s
         old = present.pop(child.key, [])
         logged[child.key] = _sync(client, experiment, child, old, under)
     for run in (run for runs in present.values() for run in runs):
-        client.delete_run(run.info.run_id)
+        _delete(client, run)
     return logged
 
 
@@ -161,7 +192,7 @@ def _sync(
     present: list[Run],
     extra_tags: Mapping[str, str],
 ) -> dict[str, str]:
-    """Leave exactly one run of ``record`` among ``present``: the one there if it is equal."""
+    """Make sure that exactly one run of ``record`` exists: the present one if it is equal."""
     digest = record.digest()
     kept = next((run for run in present if run.data.tags.get(DIGEST_TAG) == digest), None)
     if kept is None:
@@ -173,8 +204,15 @@ def _sync(
                 client.set_tag(run_id, name, value)
     for run in present:
         if run is not kept:
-            client.delete_run(run.info.run_id)
+            _delete(client, run)
     return {"run_id": run_id, "digest": digest, "status": status}
+
+
+def _delete(client: MlflowClient, run: Run) -> None:
+    """Delete a run and the models that were logged with it; MLflow keeps their files."""
+    for model in model_ids(run):
+        client.delete_logged_model(model)
+    client.delete_run(run.info.run_id)
 
 
 def _log(
@@ -192,10 +230,15 @@ def _log(
     run_id = client.create_run(experiment, start, tags, record.name).info.run_id
 
     last = max(record.epochs, default=0)
-    # At step 0: MLflow shows the value with the highest step, and there is no other one. They come
-    # before the history, because the plots of its comparison begin with the first metric.
+    _log_datasets(client, run_id, record.datasets)
+    model = None
+    if record.model is not None:
+        model = log_model(client, experiment, run_id, record.model, record.params)
+    # Final numbers have step 0: MLflow shows the value with the highest step, and they have no
+    # other
+    # one. They are logged before the history, because MLflow plots the first metric first.
     metrics = [
-        Metric(name, float(value), end, 0)
+        Metric(name, float(value), end, 0, model, *_dataset_of(name, record.datasets))
         for name, value in record.metrics.items()
         if value is not None and value == value
     ]
@@ -211,10 +254,34 @@ def _log(
     for i in range(0, len(params), PARAMS_PER_BATCH):
         client.log_batch(run_id, params=params[i : i + PARAMS_PER_BATCH])
     _log_artifacts(client, run_id, record)
-    # The digest comes last: a run that was cut off has none and is replaced next time.
+    # The digest is logged last: an interrupted run has none and is replaced next time.
     client.set_tag(run_id, DIGEST_TAG, digest)
     client.set_terminated(run_id, "FINISHED", end)
     return run_id
+
+
+def _log_datasets(client: MlflowClient, run_id: str, records: Sequence[DatasetRecord]) -> None:
+    if not records:
+        return
+    from mlflow.entities import Dataset, DatasetInput, InputTag
+
+    inputs = []
+    for record in records:
+        kind, source = (
+            ("local", {"uri": record.source}) if record.source else ("code", {"tags": {}})
+        )
+        profile = json.dumps(dict(record.profile))
+        dataset = Dataset(record.name, record.digest, kind, json.dumps(source), profile=profile)
+        inputs.append(DatasetInput(dataset, [InputTag("mlflow.data.context", record.context)]))
+    client.log_inputs(run_id, inputs)
+
+
+def _dataset_of(metric: str, records: Sequence[DatasetRecord]) -> tuple[str | None, str | None]:
+    """Name and digest of the data that a metric was measured on; (None, None) if unknown."""
+    for record in records:
+        if record.prefix is not None and metric.startswith(record.prefix):
+            return record.name, record.digest
+    return None, None
 
 
 def _log_artifacts(client: MlflowClient, run_id: str, record: RunRecord) -> None:

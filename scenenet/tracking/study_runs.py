@@ -1,4 +1,4 @@
-"""A study as an MLflow experiment of its own: a parent for each variant, a run for each seed."""
+"""A study as an MLflow experiment of its own: a parent for each variant, a nested run per seed."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import pandas as pd
+
 from scenenet.experiments.studies.settings import StudySettings
-from scenenet.experiments.studies.summary import SCORES
-from scenenet.tracking.model_runs import origin_tags
+from scenenet.metrics.score_columns import DECISIVE_FIRST
+from scenenet.tracking.model_runs import data_of, origin_tags
 from scenenet.tracking.run_log import NOTE_TAG, RunGroup, RunRecord
 from scenenet.tracking.store import TrackingSettings
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from scenenet.figures import Picture
 
 FACTS = (
@@ -24,16 +24,16 @@ FACTS = (
 )  # fmt: skip
 
 GIVEN = ("training_crops", "parameters", "epochs")
-"""Facts that a variant sets, so that they have no spread."""
+"""Facts that the variant determines; they have no spread over seeds."""
 
 
 def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
-    """The settings with the study's own experiment, so that its runs are compared by themselves."""
+    """The tracking settings with the MLflow experiment of a study or an experiment."""
     return settings.model_copy(update={"experiment": f"{settings.experiment}-{study}"})
 
 
 def note_of(study: StudySettings) -> str:
-    """What the experiment of a study says of itself."""
+    """The description of the MLflow experiment of a study."""
     return f"{study.title}. {study.asks} Thesis {study.place}; scores on the {study.part} crops."
 
 
@@ -49,9 +49,9 @@ def study_groups(
 
     Args:
         runs: of ``scenenet.experiments.studies.run``, a row per variant and seed.
-        dataset: name of the data, part of every key, so that runs on other data stand beside.
-        protocol: how the data were split and voxelised, in words, for a tag.
-        provenance: what the study was made from and by, for tags.
+        dataset: name of the data; part of every key, so that runs on other data are kept.
+        protocol: how the data were split and voxelised, for a tag.
+        provenance: record of the study, for tags and the data set.
         pictures: figures of the whole study, attached to every variant.
     """
     tags = {
@@ -62,6 +62,7 @@ def study_groups(
         "model": study.model,
         **origin_tags(provenance or {}),
     }
+    datasets = data_of(dataset, tags, f"{study.part}_")
     groups = []
     for variant in study.all_variants():
         rows = runs[runs["variant"] == variant.name].to_dict("records")
@@ -88,6 +89,7 @@ def study_groups(
                     "seed": str(row["seed"]),
                     "alive": str(bool(row["alive"])).lower(),
                 },
+                datasets=datasets,
                 seconds=float(row["training_seconds"]),
             )
             for row in rows
@@ -111,14 +113,14 @@ def study_groups(
 
 
 def _metrics(row: Mapping[str, Any], part: str) -> dict[str, float | None]:
-    # MLflow's plots begin with the first: it is the one that the thesis chooses by.
-    scores = sorted((*SCORES, "average_precision"), key=lambda name: name != "f05")
-    metrics: dict[str, float | None] = {f"{part}_{name}": float(row[name]) for name in scores}
+    metrics: dict[str, float | None] = {
+        f"{part}_{name}": float(row[name]) for name in (*DECISIVE_FIRST, "average_precision")
+    }
     return metrics | {name: float(row[name]) for name in FACTS}
 
 
 def _means(seeds: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:
-    """Means under the names of the seeds' own metrics, so that both stand in one column."""
+    """Means under the names of the metrics of the seeds, so that both share a column in MLflow."""
     means: dict[str, float | None] = {}
     for name in seeds[0]:
         values = [v for seed in seeds if (v := seed[name]) is not None and not math.isnan(v)]

@@ -25,8 +25,8 @@ from scenenet.convolution.observer import count_reached
 from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import Measurement, VoxelSample
 from scenenet.geneo import kernel_named
+from scenenet.metrics.score_columns import BETA
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
-from scenenet.metrics.voxel_scores import BETA
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
 from scenenet.models.factory import new_model

@@ -7,14 +7,26 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from scenenet.config.schema import Config
 from scenenet.experiments.cross_validation import run as cross_validation
 from scenenet.experiments.label_noise.run import COLUMNS
 from scenenet.experiments.label_noise.settings import LABELS
+from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.figures import draw_all, plan
-from scenenet.report.context import Material
+from scenenet.figures.experiments import EXPERIMENT_DRAWINGS
+from scenenet.metrics.score_columns import AT_TAU, WHOLE_TOWERS
+from scenenet.report.context import ReportContext
+from scenenet.report.page import SECTIONS
 from scenenet.report.sections import experiments as experiment_sections
+from scenenet.report.sections.experiments import EXPERIMENT_SECTIONS
 from scenenet.results.tables import write_tables
-from scenenet.tracking.experiment_runs import Origin, fold_groups, noise_groups, origin_of
+from scenenet.tracking.experiment_runs import (
+    EXPERIMENT_GROUPS,
+    Origin,
+    fold_groups,
+    label_noise_groups,
+    origin_of,
+)
 
 
 def noise_runs() -> pd.DataFrame:
@@ -44,20 +56,21 @@ def test_table_figure_and_section(noisy, thesis):
     (picture,) = draw_all([drawing], noisy.folder / "figures")
     assert picture.file.stat().st_size > 5000
     assert "scenenet 0.25 and 0.51" in picture.alt
-    section = experiment_sections.noise(Material(noisy, thesis))
+    section = experiment_sections.label_noise(ReportContext(noisy, thesis))
     assert section is not None
-    assert "scenenet does (2 of 2 trainings, F0.5 0.51" in section.blocks[0].text
+    verdict = "scenenet is nearer to the truth than its labels in all of 2 trainings (F0.5 0.51)"
+    assert verdict in section.blocks[0].text
     kinds = [block.kind for block in section.blocks]
     assert kinds == ["text", "facts", "figure", "notes", "table"]
 
 
 def test_no_experiment_no_section(results, thesis):
-    assert experiment_sections.noise(Material(results, thesis)) is None
+    assert experiment_sections.label_noise(ReportContext(results, thesis)) is None
     assert all(drawing.section != "label_noise" for drawing in plan(results))
 
 
 def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
-    groups = noise_groups(noise_runs(), Origin("tiny"))
+    groups = label_noise_groups(noise_runs(), Origin("tiny"))
     assert len(groups) == 9
     group = next(g for g in groups if g.parent.name == "scenenet, 60% wrong")
     assert [child.key for child in group.children] == [
@@ -78,14 +91,33 @@ def crossed_runs() -> pd.DataFrame:
     for model, base in (("scenenet", 0.7), ("cnn", 0.3), ("boosted trees", 0.8)):
         for seed in (0, 1):
             for fold, crops in ((1, "a b"), (2, "c d")):
-                row = dict.fromkeys(cross_validation.COLUMNS, 0.5)
+                row = dict.fromkeys(cross_validation.COLUMNS, 0.5) | {"voxels": AT_TAU}
                 row |= {"model": model, "seed": seed, "fold": fold, "crops": crops, "alive": True}
                 row |= {"f05": base + seed / 50 + fold / 10, "tp": 5, "fp": 1, "fn": 4, "tn": 90}
                 rows.append(row)
     return pd.DataFrame(rows)
 
 
-def test_cross_validation_is_the_main_result_where_it_is_there(results, thesis):
+def test_every_experiment_has_settings_a_figure_runs_in_mlflow_and_a_section():
+    """The packages above the registry register by name; none may be missing."""
+    names = set(EXPERIMENTS)
+    assert names == set(EXPERIMENT_DRAWINGS) == set(EXPERIMENT_GROUPS) == set(EXPERIMENT_SECTIONS)
+    for name, experiment in EXPERIMENTS.items():
+        settings = Config.model_fields[name].annotation
+        assert experiment.switch in settings.model_fields
+        assert EXPERIMENT_SECTIONS[name] in SECTIONS
+
+
+def test_both_ways_to_count_a_model_have_names_of_their_own():
+    runs = crossed_runs()
+    both = pd.concat([runs, runs.assign(voxels=WHOLE_TOWERS)])
+    names = [group.parent.name for group in fold_groups(both, Origin("tiny"))]
+    assert names[:2] == ["scenenet", "cnn"]
+    assert names[3] == "scenenet, whole towers"
+    assert len(set(names)) == 6
+
+
+def test_cross_validation_is_the_main_result_if_it_was_run(results, thesis):
     (results.folder / "cross_validation").mkdir()
     crossed_runs().to_csv(results.folder / "cross_validation" / "runs.csv", index=False)
     crossed = replace(results, experiments=("cross_validation",))
@@ -93,14 +125,14 @@ def test_cross_validation_is_the_main_result_where_it_is_there(results, thesis):
     (drawing,) = [d for d in plan(crossed) if d.section == "cross_validation"]
     (picture,) = draw_all([drawing], crossed.folder / "figures")
     assert picture.file.stat().st_size > 5000
-    assert "its folds from 0.81 to 0.91" in picture.alt
-    section = experiment_sections.cross_validation(Material(crossed, thesis))
+    assert "folds from 0.81 to 0.91" in picture.alt
+    section = experiment_sections.cross_validation(ReportContext(crossed, thesis))
     assert section is not None and section.title.startswith("Main result")
     assert "boosted trees 0.960, scenenet 0.860, cnn 0.460" in section.blocks[0].text
     assert [block.kind for block in section.blocks] == ["text", "facts", "figure", "table"]
-    assert experiment_sections.cross_validation(Material(results, thesis)) is not None
+    assert experiment_sections.cross_validation(ReportContext(results, thesis)) is not None
     (results.folder / "tables" / "cross_validation.csv").unlink()
-    assert experiment_sections.cross_validation(Material(results, thesis)) is None
+    assert experiment_sections.cross_validation(ReportContext(results, thesis)) is None
 
 
 def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():

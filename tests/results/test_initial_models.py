@@ -12,7 +12,7 @@ from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.settings import MetricSettings, ModelSettings, TrainingSettings
 from scenenet.results.folder import SeedResult
-from scenenet.results.initial_models import DRAWN, FIRST_STEP, start_of
+from scenenet.results.initial_models import DRAWN, FIRST_STEP, initial_model
 from scenenet.training.train import fit
 
 
@@ -29,9 +29,9 @@ def test_the_thesis_protocol_begins_with_the_numbers_of_the_seed(scene):
     for kind in ("scenenet", "cnn"):
         settings = ModelSettings(name="m", kind=kind, kernel_size=(5, 5, 5), training=still)
         trained, history = fit(crops, [], settings, seed=3)
-        start = start_of(result(settings, history), trained)
+        start = initial_model(result(settings, history), trained)
         assert start is not None
-        assert start.said == DRAWN
+        assert start.origin == DRAWN
         began, ended = start.model.observer()[0], trained.observer()[0]
         assert torch.allclose(began, ended, atol=1e-6)
 
@@ -39,7 +39,7 @@ def test_the_thesis_protocol_begins_with_the_numbers_of_the_seed(scene):
 def test_kernels_are_shown_at_the_size_that_was_chosen_later():
     settings = ModelSettings(name="m", kind="scenenet", kernel_size=(9, 9, 9))
     tuned = new_model(settings, 3).with_kernel_size((9, 5, 5))
-    start = start_of(result(settings), tuned)
+    start = initial_model(result(settings), tuned)
     assert start is not None
     assert start.model.kernel_size == (9, 5, 5)
 
@@ -51,9 +51,9 @@ def test_of_a_search_the_first_row_of_the_history_is_taken():
     first = trained.shape_parameters() | {"cylinder.r": 0.7}
     rows = [{"epoch": 1, "loss": 0.9, "search": 2, **first}, {"epoch": 2, "loss": 0.8, **first}]
     rows[1]["cylinder.r"] = 0.2
-    start = start_of(result(settings, pd.DataFrame(rows)), trained)
+    start = initial_model(result(settings, pd.DataFrame(rows)), trained)
     assert start is not None
-    assert start.said == FIRST_STEP
+    assert start.origin == FIRST_STEP
     assert isinstance(start.model, GeneoModel)
     assert start.model.shape_parameters()["cylinder.r"] == pytest.approx(0.7)
     assert start.model.kernel_size == trained.kernel_size
@@ -62,11 +62,11 @@ def test_of_a_search_the_first_row_of_the_history_is_taken():
 def test_a_start_that_looked_at_the_data_is_not_drawn_again():
     informed = TrainingSettings(init="informed")
     settings = ModelSettings(name="m", kind="scenenet", training=informed)
-    assert start_of(result(settings), new_model(settings, 3)) is None
+    assert initial_model(result(settings), new_model(settings, 3)) is None
     cnn = ModelSettings(name="m", kind="cnn", training=informed)
-    assert start_of(result(cnn), new_model(cnn, 3)) is None
+    assert initial_model(result(cnn), new_model(cnn, 3)) is None
 
 
 def test_without_a_record_and_a_history_nothing_is_said():
     model = MetricSceneNet(metric=MetricSettings())
-    assert start_of(SeedResult("m", "scenenet", 3, {}), model) is None
+    assert initial_model(SeedResult("m", "scenenet", 3, {}), model) is None

@@ -13,10 +13,11 @@ import pytest
 
 from scenenet.core.errors import InputError
 from scenenet.experiments.published import Thesis, read_thesis
+from scenenet.metrics.score_columns import AT_TAU, WHOLE_TOWERS
 from scenenet.models.model_file import read_model
 from scenenet.results import tables
 from scenenet.results.folder import Results
-from scenenet.results.score_tables import REACH_TAU, TRIVIAL, WHOLE_TOWERS
+from scenenet.results.score_tables import TRIVIAL
 
 
 def row(frame: pd.DataFrame, **where) -> pd.Series:
@@ -246,5 +247,5 @@ def test_both_ways_to_count_stand_beside_each_other(results: Results, thesis: Th
     assert table.loc["scenenet", "tau_f05"] == pytest.approx(np.mean(by_observer))
     models = tables.models(fresh, thesis).set_index("model")
     assert set(models.loc["scenenet", "voxels"]) == {WHOLE_TOWERS}
-    assert set(np.atleast_1d(models.loc["cnn", "voxels"])) == {REACH_TAU}
+    assert set(np.atleast_1d(models.loc["cnn", "voxels"])) == {AT_TAU}
     assert seeds[seeds["model"] == "scenenet"]["f05"].mean() == pytest.approx(expected)

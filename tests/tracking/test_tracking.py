@@ -10,6 +10,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import mlflow
 import numpy as np
 import pandas as pd
 import pytest
@@ -33,6 +34,7 @@ from scenenet.tracking import (
     model_groups,
     store_id,
 )
+from scenenet.tracking.logged_model import example
 from scenenet.tracking.registry import register_champions
 from scenenet.tracking.study_runs import experiment_of, note_of, study_groups
 
@@ -100,6 +102,60 @@ def test_a_training_is_a_run_with_all_that_is_known_of_it(settings, client, resu
     assert tags["protocol"] == "20/10/70 by stretch"
     assert (tags["scenenet.config"], tags["scenenet.code"]) == ("c0f19", "c0de")
     assert tags["scenenet.data"]
+
+
+def test_the_data_of_a_training_are_data_sets_with_their_fingerprint(
+    settings, client, results, tmp_path
+):
+    log(settings, results, tmp_path)
+    (run,) = runs(client)["scenenet seed 1"]
+    inputs = {one.tags[0].value: one.dataset for one in run.inputs.dataset_inputs}
+    assert set(inputs) == {"training", "validation", "test"}
+    assert {data.digest for data in inputs.values()} == {run.data.tags["scenenet.data"]}
+    assert inputs["test"].name == "corridors, test"
+    source = mlflow.data.get_source(inputs["test"])
+    assert source.uri == (results.folder / "split" / "split.csv").as_posix()
+    assert json.loads(inputs["test"].profile) == {"crops": 3}
+    model = client.get_logged_model(run.outputs.model_outputs[0].model_id)
+    measured_on = {metric.key: metric.dataset_name for metric in model.metrics}
+    assert measured_on["test_f05"] == "corridors, test"
+    assert measured_on["validation_f05"] == "corridors, validation"
+    assert measured_on["tau"] is None
+
+
+def test_every_tuned_model_is_a_logged_model_with_signature_and_example(
+    settings, client, results, tmp_path
+):
+    log(settings, results, tmp_path)
+    experiment = client.get_experiment_by_name("scenenet").experiment_id
+    logged = {model.name: model for model in client.search_logged_models([experiment])}
+    assert set(logged) == {f"{m}-seed-{s}" for m in ("scenenet", "cnn") for s in (0, 1)}
+    model = logged["scenenet-seed-1"]
+    (run,) = runs(client)["scenenet seed 1"]
+    assert model.source_run_id == run.info.run_id
+    assert str(model.status) == "READY"
+    assert model.params["training.epochs"] == "4"
+    assert {m.key: m.value for m in model.metrics}["test_precision"] == pytest.approx(0.6)
+    mlflow.set_tracking_uri(settings.uri)
+    info = mlflow.models.get_model_info(f"models:/{model.model_id}")
+    assert info.signature.inputs.inputs[0].shape == (-1, -1, -1, -1)
+    loaded = mlflow.pyfunc.load_model(f"models:/{model.model_id}")
+    assert loaded.input_example.shape == example().shape
+    assert loaded.predict(example()).shape == example().shape
+
+
+def test_a_replaced_run_takes_its_logged_model_with_it(settings, client, results, tmp_path):
+    log(settings, results, tmp_path)
+    (before,) = runs(client)["cnn seed 0"]
+    file = results.folder / "evaluate" / "cnn" / "seed-0.json"
+    changed = json.loads(file.read_text())
+    changed["voxel"]["precision"] = 0.9
+    file.write_text(json.dumps(changed))
+    log(settings, replace(results), tmp_path)
+    experiment = client.get_experiment_by_name("scenenet").experiment_id
+    logged = [model.model_id for model in client.search_logged_models([experiment])]
+    assert len(logged) == 4
+    assert before.outputs.model_outputs[0].model_id not in logged
 
 
 def test_every_epoch_of_loss_and_parameters_is_there(settings, client, results, tmp_path):
@@ -358,8 +414,13 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(
         assert (tags["protocol"], tags["variant"]) == ("20/10/70 by stretch", "E")
         assert tags["scenenet.code"] == "c0de" and tags["scenenet.data"]
         assert tags.get("seed") == seed
-    told = client.get_experiment(experiment.experiment_id).tags["mlflow.note.content"]
-    assert "Which?" in told and "Table 5.5" in told
+    description = client.get_experiment(experiment.experiment_id).tags["mlflow.note.content"]
+    assert "Which?" in description and "Table 5.5" in description
+    (run,) = client.search_runs(
+        [experiment.experiment_id], "tags.variant = 'E' and tags.seed = '0'"
+    )
+    (data,) = (one.dataset for one in run.inputs.dataset_inputs)
+    assert (data.name, data.digest) == ("toys", run.data.tags["scenenet.data"])
     parent = written["runs"]["study-ablations/toys/E"]["run_id"]
     (picture,) = client.list_artifacts(parent, "figures")
     assert picture.path == "figures/study-ablations.png"
@@ -372,8 +433,8 @@ def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
 ):
     groups = model_groups(results, "toys")
     log_runs(settings, groups, tmp_path / "runs.json")
-    told = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
-    registered = register_champions(*told)
+    arguments = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
+    registered = register_champions(*arguments)
     best = results.champion("scenenet")
     assert registered["scenenet-scenenet"]["seed"] == best.seed
     assert registered["scenenet-scenenet"]["version"] == 1
@@ -399,7 +460,7 @@ def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
         expected = model(Occupancy.of_grids(indices, None, (9, 8, 7))).numpy()
     np.testing.assert_allclose(answer, expected, atol=1e-6)
 
-    again = register_champions(*told)
+    again = register_champions(*arguments)
     assert again["scenenet-scenenet"]["version"] == 1, "the same champion is no new version"
     # Another seed takes the lead: the alias moves on, the first version stays.
     better = results.folder / "tune" / "scenenet" / f"seed-{1 - best.seed}.json"
@@ -408,20 +469,24 @@ def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
     better.write_text(json.dumps(tuning))
     changed = Results(results.folder, results.models, results.seeds, results.surveys)
     log_runs(settings, model_groups(changed, "toys"), tmp_path / "runs.json")
-    moved = register_champions(settings, changed, *told[2:])
+    moved = register_champions(settings, changed, *arguments[2:])
     new = moved["scenenet-scenenet"]
     assert (new["seed"], new["version"]) == (1 - best.seed, 2)
     client = MlflowClient(tracking_uri=settings.uri)
     assert client.get_model_version_by_alias("scenenet-scenenet", "champion").version == 2
     assert len(client.search_model_versions("name = 'scenenet-scenenet'")) == 2
+    # The first version can still be loaded.
+    mlflow.set_tracking_uri(settings.uri)
+    old = mlflow.pyfunc.load_model("models:/scenenet-scenenet/1")
+    np.testing.assert_allclose(old.predict(grids), expected, atol=1e-6)
 
 
 def test_the_best_of_all_models_is_the_champion_of_the_run(settings, results, tmp_path):
     """That of each model has a name of its own; the bare name is the best there is."""
     client = MlflowClient(tracking_uri=settings.uri)
-    told = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
+    arguments = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
     log_runs(settings, model_groups(results, "toys"), tmp_path / "runs.json")
-    registered = register_champions(*told)
+    registered = register_champions(*arguments)
     assert set(registered) == {"scenenet", "scenenet-scenenet", "scenenet-cnn"}
     assert registered["scenenet"]["model"] == "scenenet"
     version = client.get_model_version_by_alias("scenenet", "champion")
@@ -434,7 +499,7 @@ def test_the_best_of_all_models_is_the_champion_of_the_run(settings, results, tm
     tuned.write_text(json.dumps(tuning))
     changed = Results(results.folder, results.models, results.seeds, results.surveys)
     log_runs(settings, model_groups(changed, "toys"), tmp_path / "runs.json")
-    moved = register_champions(settings, changed, *told[2:])
+    moved = register_champions(settings, changed, *arguments[2:])
     assert (moved["scenenet"]["model"], moved["scenenet"]["version"]) == ("cnn", 2)
     assert moved["scenenet-scenenet"]["version"] == 1
     version = client.get_model_version_by_alias("scenenet", "champion")

@@ -3,6 +3,8 @@
 Nothing here decides on a result: after a change of a caption or of a label nothing runs again.
 """
 
+from scenenet.results.tables import table_titles
+
 # Numbered, because the report sorts them by name; the order is that of the page.
 CATEGORIES = {
     "page": "1 Page",
@@ -19,22 +21,7 @@ CATEGORIES = {
 }
 
 # Stem of a table -> its title, and the section of the page that it belongs to.
-TABLE_TITLES = {
-    "models": ("Scores of each model", "models"),
-    "seeds": ("Scores of each seed", "models"),
-    "whole_towers": ("Voxels at or above tau, and whole towers", "models"),
-    "tower_scores": ("Towers found", "models"),
-    "times": ("Times", "models"),
-    "parameters": ("Learned parameters in metres", "learned"),
-    "certificate": ("Verified properties", "learned"),
-    "certificate_turns": ("Change of the output under rotation", "learned"),
-    "thesis_and_ours": ("Thesis and this run", "models"),
-    "cross_validation": ("Cross-validation", "models"),
-    "label_noise": ("Label noise", "studies"),
-    "classes": ("Points of each class", "data"),
-    "towers": ("Labelled towers", "data"),
-    "voxelisation": ("Voxelisation", "data"),
-}
+TABLE_TITLES = table_titles()
 
 
 def in_report(file, caption, section, group, labels):

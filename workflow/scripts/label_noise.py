@@ -5,12 +5,12 @@ import _job
 
 def label_noise(job: _job.Job) -> None:
     from scenenet.dataset.voxels import VoxelSettings
-    from scenenet.experiments.label_noise.run import run_noise
-    from scenenet.experiments.label_noise.settings import NoiseSettings
+    from scenenet.experiments.label_noise.run import train_with_label_noise
+    from scenenet.experiments.label_noise.settings import LabelNoiseSettings
     from scenenet.models.settings import ModelSettings
 
-    run_noise(
-        NoiseSettings(**job.settings),
+    train_with_label_noise(
+        LabelNoiseSettings(**job.settings),
         [ModelSettings(**model) for model in job.identity["models"]],
         VoxelSettings(**job.identity["voxels"]),
         job.identity["seed"],

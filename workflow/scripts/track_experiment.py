@@ -9,7 +9,7 @@ def track_experiment(job: _job.Job) -> None:
     from scenenet.figures import read_pictures
     from scenenet.results.folder import read_result, read_table
     from scenenet.tracking import TrackingSettings, log_runs
-    from scenenet.tracking.experiment_runs import EXPERIMENT_GROUPS, EXPERIMENT_NOTES, origin_of
+    from scenenet.tracking.experiment_runs import EXPERIMENT_GROUPS, experiment_note, origin_of
     from scenenet.tracking.study_runs import experiment_of
 
     experiment = job.identity["experiment"]
@@ -19,7 +19,7 @@ def track_experiment(job: _job.Job) -> None:
     pictures = read_pictures(Path(job.input.pictures).parent, [experiment])
     origin = origin_of(job.identity["dataset"], *records, pictures)
     groups = EXPERIMENT_GROUPS[experiment](read_table(job.input.runs), origin)
-    log_runs(settings, groups, job.output.runs, job.input.store, EXPERIMENT_NOTES[experiment])
+    log_runs(settings, groups, job.output.runs, job.input.store, experiment_note(experiment))
 
 
 _job.run(track_experiment)

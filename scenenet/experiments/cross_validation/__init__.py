@@ -1,1 +1,1 @@
-"""Cross-validation: every crop is left out once."""
+"""Cross-validation: every crop is a test crop once (thesis 5.2.4)."""

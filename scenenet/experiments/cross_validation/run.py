@@ -1,6 +1,6 @@
-"""Every crop is a test crop once: what a split of a handful of crops cannot tell.
+"""Cross-validation: every crop is a test crop once, because one split of a few crops says little.
 
-tau is chosen on the training crops of the fold, and nothing is chosen on those left out
+tau is chosen on the training crops of the fold; nothing is chosen on the crops left out
 (docs/method/accuracy.md).
 """
 
@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import pandas as pd
 
 from scenenet.core.files import atomic
 from scenenet.core.progress import track
@@ -16,19 +18,13 @@ from scenenet.dataset.folds import folds
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.detection.settings import DetectionSettings
 from scenenet.experiments.train_and_tune import train_and_tune
+from scenenet.metrics.score_columns import AT_TAU, SCORES, WHOLE_TOWERS
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 COLUMNS = (
-    "model", "seed", "fold", "crops", "training_crops", "alive", "tau", "precision", "recall",
-    "f05", "iou_tower", "miou", "tp", "fp", "fn", "tn", "training_f05", "parameters",
-    "training_seconds",
+    "model", "voxels", "seed", "fold", "crops", "training_crops", "alive", "tau", *SCORES,
+    "tp", "fp", "fn", "tn", "training_f05", "parameters", "training_seconds",
 )  # fmt: skip
-
-WHOLE_TOWERS = ", whole towers"
-"""Behind the name of a model: its voxels are those of the towers that are found with it."""
 
 
 def cross_validate(
@@ -40,30 +36,30 @@ def cross_validate(
     detection: DetectionSettings,
     out: str | Path,
 ) -> pd.DataFrame:
-    """Train one model from every seed on every fold, score it on the crops left out, and write two
-    rows for each: of the voxels that reach tau, and of those of whole towers.
+    """Train one model from every seed on every fold and score it on the crops left out.
+
+    There are two rows per training (column ``voxels``): one counts the voxels at or above tau, the
+    other the voxels of whole towers.
 
     Args:
         voxel_manifests: of the voxel stores.
-        model: what is trained; None for the boosted trees.
-        leave_out, neighbour: as ``scenenet.dataset.folds``.
+        model: what to train; None for the boosted trees.
+        seeds: of the trainings.
+        leave_out, neighbour: as for ``scenenet.dataset.folds.folds``.
         detection: what makes a tower; the same for every model.
         out: CSV file, columns ``COLUMNS``; ``training_f05`` is on the crops that tau was chosen on.
 
     Returns:
-        what was written.
+        the table that was written.
 
     Raises:
-        InputError: there are too few crops, or none with a tower to learn from.
+        InputError: there are too few crops, or no training crop has a tower.
     """
-    import pandas as pd
-
-    table = pd.DataFrame(
-        run_folds(load(voxel_manifests), model, seeds, leave_out, neighbour, detection)
-    )
+    rows = run_folds(load(voxel_manifests), model, seeds, leave_out, neighbour, detection)
+    table = pd.DataFrame(rows)[list(COLUMNS)]
     with atomic(out) as partial:
-        table[list(COLUMNS)].to_csv(partial, index=False, float_format="%.6g")
-    return table[list(COLUMNS)]
+        table.to_csv(partial, index=False, float_format="%.6g")
+    return table
 
 
 def run_folds(
@@ -82,20 +78,24 @@ def run_folds(
     for seed, number, fold in track(plans, f"{name}: folds"):
         training = [dataset.samples[i] for i in fold.learnt]
         left_out = [dataset.samples[i] for i in fold.out]
-        rival = train_and_tune(model, training, [], seed)
+        tuned = train_and_tune(model, training, [], seed)
         shared = {
+            "model": name,
             "seed": seed,
             "fold": number,
             "crops": " ".join(sample.id for sample in left_out),
             "training_crops": len(training),
-            "tau": rival.tau,
-            "training_f05": rival.f05,
-            "parameters": rival.parameters,
-            "training_seconds": rival.seconds,
+            "tau": tuned.tau,
+            "training_f05": tuned.f05,
+            "parameters": tuned.parameters,
+            "training_seconds": tuned.seconds,
         }
-        reached, whole = rival.score(left_out), rival.score_towers(left_out, detection)
-        for called, counts in ((name, reached), (name + WHOLE_TOWERS, whole)):
+        counted = {
+            AT_TAU: tuned.score(left_out),
+            WHOLE_TOWERS: tuned.score_towers(left_out, detection),
+        }
+        for voxels, counts in counted.items():
             cells = {part: getattr(counts, part) for part in ("tp", "fp", "fn", "tn")}
-            alive = {"alive": counts.tp > 0}
-            rows.append({"model": called, **shared, **alive, **counts.scores(), **cells})
+            own = {"voxels": voxels, "alive": counts.tp > 0}
+            rows.append(shared | own | counts.scores() | cells)
     return rows

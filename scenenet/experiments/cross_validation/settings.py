@@ -9,11 +9,15 @@ from scenenet.experiments.contenders import Contender
 
 
 class CrossValidationSettings(Settings):
-    """Every crop once a test crop, where crops are too few for one split to say much."""
+    """Every crop is a test crop once, for data sets too small for one split."""
 
     leave_out: int = Field(
-        0, ge=0, description="crops left out at a time, in the order of their names; 0 for none"
+        0,
+        ge=0,
+        description="crops left out at a time, in the order of their names; 0 for no "
+        "cross-validation",
     )
     contenders: tuple[Contender, ...] = Field(
-        (), description="models that take part beside the boosted trees; none for every model"
+        (),
+        description="models that take part in addition to the boosted trees; empty for every model",
     )

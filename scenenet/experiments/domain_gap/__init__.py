@@ -1,1 +1,1 @@
-"""How far synthetic crops are from real ones, and what that costs a model."""
+"""The domain gap: synthetic crops compared with real ones."""

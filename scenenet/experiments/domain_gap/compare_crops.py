@@ -1,10 +1,9 @@
-"""Synthetic crops beside real ones: each property, and whether a classifier can tell them apart.
+"""Synthetic crops compared with real ones, by property and by a classifier that separates them.
 
-    python -m scenenet.experiments.domain_gap.compare_crops --real FOLDER_OF_TS40K_SAMPLES --towers
-    100
+    python -m scenenet.experiments.domain_gap.compare_crops --real FOLDER --towers 100
 
-prints the tables of docs/method/synthetic.md. The synthetic crops come through the same chain as
-those of a survey: LAZ file, towers, crops.
+prints the tables of docs/method/synthetic.md; FOLDER has TS40K samples. Synthetic crops are made by
+the same stages as the crops of a survey: LAZ file, towers, crops.
 """
 
 from __future__ import annotations
@@ -39,14 +38,14 @@ if TYPE_CHECKING:
 
 RESOLUTION = 64
 VOXELS = 1500
-"""Occupied voxels of a crop that the classifier of voxels gets."""
+"""Number of occupied voxels per crop for the classifier of voxels."""
 FOLDS = 6
 REPEATS, VOXEL_REPEATS = 10, 3
-"""Times that crops and voxels are cross-validated, each time with other parts."""
+"""Repetitions of the cross-validation of crops and of voxels, each with different folds."""
 
 
 def synthetic_crops(settings: SyntheticSettings) -> Iterator[PointCloud]:
-    """The crops of a synthetic survey, made as those of any survey are."""
+    """The crops of a synthetic survey, made by the stages for any survey."""
     with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
         folder = Path(scratch)
         survey, manifest = folder / "survey.laz", folder / "crops.json"
@@ -63,12 +62,12 @@ def real_crops(folder: str | Path) -> Iterator[PointCloud]:
     """The TS40K samples of a folder.
 
     Raises:
-        InputError: there is none.
+        InputError: the folder has no samples.
     """
     samples = sample_files(folder)
     if not samples:
         raise InputError(
-            "this is no TS40K sample", file=folder, remedy="Name a folder of .npy or .pt samples"
+            "there are no TS40K samples", file=folder, remedy="Name a folder of .npy or .pt samples"
         )
     for sample in samples:
         yield read(sample, "edp")
@@ -76,13 +75,13 @@ def real_crops(folder: str | Path) -> Iterator[PointCloud]:
 
 @dataclass(frozen=True)
 class Measured:
-    """A set of crops in numbers.
+    """Measurements of a set of crops.
 
     Attributes:
         properties: ``crop_statistics``, a row per crop.
         grids: ``voxel_statistics``, a row per crop.
-        voxels: ``voxel_features`` of some occupied voxels, (V, F).
-        crop: (V,) the crop that each of them is of.
+        voxels: (V, F) ``voxel_features`` of some occupied voxels.
+        crop: (V,) number of the crop of each voxel.
     """
 
     properties: pd.DataFrame
@@ -92,7 +91,7 @@ class Measured:
 
 
 def measure(crops: Iterable[PointCloud]) -> Measured:
-    """Properties, grid and voxels of crops."""
+    """Measure crops."""
     properties, grids, voxels, owner = [], [], [], []
     rng = np.random.default_rng(0)
     for number, cloud in enumerate(crops):
@@ -111,12 +110,12 @@ def measure(crops: Iterable[PointCloud]) -> Measured:
     )
 
 
-def beside(real: pd.DataFrame, synthetic: pd.DataFrame) -> pd.DataFrame:
-    """Each property of real and synthetic crops.
+def compare_properties(real: pd.DataFrame, synthetic: pd.DataFrame) -> pd.DataFrame:
+    """Compare each property of real and synthetic crops.
 
     Returns:
-        a row per property: unit, meaning, least and greatest real value, 5th, 50th and 95th
-        percentile of the synthetic ones, and ``within``: the middle one lies in the real range.
+        a row per property: unit, meaning, lowest and highest real value, 5th, 50th and 95th
+        percentile of the synthetic crops, and ``within``: whether the median is in the real range.
     """
     rows = []
     for name, (unit, meaning) in PROPERTIES.items():
@@ -131,13 +130,13 @@ def beside(real: pd.DataFrame, synthetic: pd.DataFrame) -> pd.DataFrame:
 
 
 @dataclass(frozen=True)
-class Apart:
-    """How well a classifier tells real from synthetic.
+class Separability:
+    """How well a classifier separates real from synthetic crops.
 
     Attributes:
-        auc: area under the ROC curve in cross-validation; 0.5 is not at all.
-        spread: its standard deviation over the repeats.
-        features: AUC of each feature by itself, whichever way round, greatest first.
+        auc: area under the ROC curve in cross-validation; 0.5 means not separable.
+        spread: its standard deviation over the repetitions.
+        features: AUC of each feature alone, in the better direction, highest first.
     """
 
     auc: float
@@ -145,8 +144,8 @@ class Apart:
     features: pd.Series
 
 
-def tell_apart(real: pd.DataFrame, synthetic: pd.DataFrame) -> Apart:
-    """Tell crops apart by numbers of whole crops, a row each."""
+def crop_separability(real: pd.DataFrame, synthetic: pd.DataFrame) -> Separability:
+    """Separate crops by numbers of whole crops, a row each."""
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import StratifiedKFold, cross_val_predict
 
@@ -155,18 +154,18 @@ def tell_apart(real: pd.DataFrame, synthetic: pd.DataFrame) -> Apart:
     scores = []
     for repeat in range(REPEATS):
         folds = StratifiedKFold(min(FOLDS, len(real)), shuffle=True, random_state=repeat)
-        # So few real crops need small leaves.
+        # There are few real crops, so leaves must be small.
         model = _classifier(leaf=2)
-        answer = cross_val_predict(model, x, y, cv=folds, method="predict_proba")[:, 1]
-        scores.append(roc_auc_score(y, answer))
-    return Apart(float(np.mean(scores)), float(np.std(scores)), _one_by_one(x, y))
+        output = cross_val_predict(model, x, y, cv=folds, method="predict_proba")[:, 1]
+        scores.append(roc_auc_score(y, output))
+    return Separability(float(np.mean(scores)), float(np.std(scores)), _one_by_one(x, y))
 
 
-def tell_voxels_apart(real: Measured, synthetic: Measured) -> tuple[Apart, Apart]:
-    """Tell apart by the voxel features of the boosted trees; whole crops are kept out of training.
+def voxel_separability(real: Measured, synthetic: Measured) -> tuple[Separability, Separability]:
+    """Separate by the voxel features of the boosted trees; the folds keep crops whole.
 
     Returns:
-        for single voxels, and for crops by the mean answer to their voxels.
+        for single voxels, and for crops by the mean output over their voxels.
     """
     from sklearn.metrics import roc_auc_score
 
@@ -183,17 +182,18 @@ def tell_voxels_apart(real: Measured, synthetic: Measured) -> tuple[Apart, Apart
         fold = np.empty(len(crops), int)
         for kind in (is_real, ~is_real):
             fold[kind] = rng.permutation(kind.sum()) % FOLDS
-        answer = np.empty(len(y))
+        output = np.empty(len(y))
         for k in range(FOLDS):
-            out = np.isin(crop, crops[fold == k])
-            model = _classifier(leaf=200).fit(x[~out], y[~out])
-            answer[out] = model.decision_function(x[out])
-        voxel_scores.append(roc_auc_score(y, answer))
-        mean = pd.Series(answer).groupby(crop).mean()
+            left_out = np.isin(crop, crops[fold == k])
+            model = _classifier(leaf=200).fit(x[~left_out], y[~left_out])
+            output[left_out] = model.decision_function(x[left_out])
+        voxel_scores.append(roc_auc_score(y, output))
+        mean = pd.Series(output).groupby(crop).mean()
         crop_scores.append(roc_auc_score(is_real, mean.loc[crops]))
     features = _one_by_one(x, y)
     voxels, whole = (
-        Apart(float(np.mean(s)), float(np.std(s)), features) for s in (voxel_scores, crop_scores)
+        Separability(float(np.mean(s)), float(np.std(s)), features)
+        for s in (voxel_scores, crop_scores)
     )
     return voxels, whole
 
@@ -218,23 +218,23 @@ def _one_by_one(x: pd.DataFrame, y: np.ndarray) -> pd.Series:
     return pd.Series(alone).sort_values(ascending=False)
 
 
-def all_tests(real: Measured, synthetic: Measured) -> dict[str, Apart]:
-    """Every way of telling them apart, by what it looks at."""
-    voxels, crops = tell_voxels_apart(real, synthetic)
+def all_tests(real: Measured, synthetic: Measured) -> dict[str, Separability]:
+    """Separability by each kind of features."""
+    voxels, crops = voxel_separability(real, synthetic)
     return {
-        "properties of a crop": tell_apart(real.properties, synthetic.properties),
-        "how its voxels lie": tell_apart(real.grids, synthetic.grids),
+        "properties of a crop": crop_separability(real.properties, synthetic.properties),
+        "statistics of its voxels": crop_separability(real.grids, synthetic.grids),
         "features of one voxel": voxels,
         "features of all voxels of a crop": crops,
     }
 
 
-def markdown(table: pd.DataFrame, tests: Mapping[str, Apart], crops: tuple[int, int]) -> str:
+def markdown(table: pd.DataFrame, tests: Mapping[str, Separability], crops: tuple[int, int]) -> str:
     """The tables as text.
 
     Args:
-        table: as ``beside`` gives it.
-        tests: as ``all_tests`` gives them.
+        table: of ``compare_properties``.
+        tests: of ``all_tests``.
         crops: number of real and of synthetic crops.
     """
     lines = [
@@ -248,7 +248,7 @@ def markdown(table: pd.DataFrame, tests: Mapping[str, Apart], crops: tuple[int, 
             f"| {row['meaning']} | {row['unit']} | {row['real_low']:.3g} to {row['real_high']:.3g}"
             f" | {spread} | {'yes' if row['within'] else '**no**'} |"
         )
-    lines += ["", "| told apart by | AUC | best features alone |", "|---|---|---|"]
+    lines += ["", "| separated by | AUC | best single features |", "|---|---|---|"]
     for name, test in tests.items():
         best = ", ".join(f"{key} {value:.2f}" for key, value in test.features.head(6).items())
         lines.append(f"| {name} | {test.auc:.2f} ± {test.spread:.2f} | {best} |")
@@ -271,7 +271,7 @@ def main() -> None:
         towers=arguments.towers, seed=arguments.seed, **json.loads(arguments.settings)
     )
     real, synthetic = measure(real_crops(arguments.real)), measure(synthetic_crops(settings))
-    table = beside(real.properties, synthetic.properties)
+    table = compare_properties(real.properties, synthetic.properties)
     crops = (len(real.properties), len(synthetic.properties))
     print(markdown(table, all_tests(real, synthetic), crops))
 

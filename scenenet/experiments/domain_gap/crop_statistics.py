@@ -1,9 +1,9 @@
-"""What a crop around a tower is like, in numbers with units (thesis 5.1.1, 5.1.2 and 5.1.4).
+"""Statistics of a crop around a tower, with units (thesis 5.1.1, 5.1.2 and 5.1.4).
 
-The numbers say how alike two sets of crops are, real and synthetic ones above all. They follow from
-the points and their EDP codes alone, in the way in which the public TS40K crops are coded (see
-docs/method/synthetic.md): ground in 2, 10 and 19, low vegetation in 11, whatever is taller in 5
-and 12.
+They measure how similar two sets of crops are, such as real and synthetic ones. They are computed
+from the points and their EDP codes alone, as the public TS40K crops use them (see
+docs/method/synthetic.md): 2, 10 and 19 are ground, 11 is low vegetation, 5 and 12 are taller
+objects.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
 from scenenet.pointcloud.cloud import PointCloud
 
-GROUND, LOW, TALL, STRAY, WIRE, TOWER = (2, 10, 19), (11,), (5, 12), (7,), (16,), (15,)
+GROUND, LOW, TALL, STRAY, CONDUCTOR, TOWER = (2, 10, 19), (11,), (5, 12), (7,), (16,), (15,)
 CODES = (1, 2, 3, 4, 5, 7, 10, 11, 12, 15, 16, 19)
 RESOLUTIONS = (64, 128)
 CELL_M = 1.0
@@ -24,44 +24,47 @@ CELL_M = 1.0
 SHADOW_CELL_M = 0.5
 NEAR_GROUND_M = 1.5
 OFF_BODY_M = 0.8
-"""Labelled tower points nearer to the ground or farther from the axis are hardly of the tower."""
+"""Points labelled tower below the first or beyond the second are probably mislabelled."""
 CLEAR_OF_ALL_M = 3.0
-"""A return this far above vegetation and tower is a stray in the sky."""
+"""A return at least this far above vegetation and tower counts as a stray return."""
 
 PROPERTIES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "points": ("", "points"),
         "density": ("1/m²", "points per area with returns"),
         "shadow": ("%", "0.5 m cells inside the crop without any return"),
-        "spacing": ("m", "distance of a return to the nearest other one, median"),
-        "evenness": ("", "that distance over the one of random points, on open ground"),
-        "extent": ("m", "longest side of the bounding box, which sets the voxel"),
+        "spacing": ("m", "median distance of a return to the nearest other one"),
+        "evenness": ("", "ratio of that distance to that of random points, on open ground"),
+        "extent": ("m", "longest side of the bounding box, which determines the voxel size"),
         "tower_height": ("m", "height of the labelled tower"),
         "occupied_64": ("%", "occupied voxels, 64³"),
         "occupied_128": ("%", "occupied voxels, 128³"),
         "tower_voxels_64": ("", "tower voxels, 64³"),
         "tower_voxels_128": ("", "tower voxels, 128³"),
         "tower_points": ("", "points labelled tower"),
-        "tower_near_ground": ("%", "of them within 1.5 m of the ground"),
-        "tower_wrong": ("%", "of them within 1.5 m of the ground or 0.8 m or more off the axis"),
-        "tower_body": ("1/m", "of them at the body between 3 m and the arms, per m of height"),
+        "tower_near_ground": ("%", "tower points within 1.5 m of the ground"),
+        "tower_wrong": (
+            "%",
+            "tower points within 1.5 m of the ground, or 0.8 m or more off the axis",
+        ),
+        "tower_body": ("1/m", "tower points of the body between 3 m and the arms, per m of height"),
         "strays": ("", "stray returns above everything"),
-        "stray_height": ("m", "median height of them above the ground"),
-        "stray_top": ("m", "greatest height of them above the ground"),
+        "stray_height": ("m", "median height of the stray returns above the ground"),
+        "stray_top": ("m", "greatest height of the stray returns above the ground"),
         "ground_density": ("1/m²", "returns from the ground per area of the crop"),
         "low_density": ("1/m²", "returns from low vegetation per area of the crop"),
         "tall_density": ("1/m²", "returns from tall vegetation per area of the crop"),
-        "slope": ("°", "slope of the ground, of a plane through it"),
+        "slope": ("°", "slope of a plane fitted to the ground"),
         "roughness": ("m", "standard deviation of the ground from that plane"),
         "canopy_cover": ("%", "1 m cells with returns above 2 m"),
         "canopy_height": ("m", "95th percentile of tall vegetation above the ground"),
         "canopy_middle": ("m", "median of tall vegetation above the ground"),
         "canopy_gaps": ("%", "1 m cells below the canopy with returns from the ground"),
-        "wire_density": ("1/m", "wire points per m of line"),
-        "wires": ("", "wires side by side"),
-        "wire_spacing": ("m", "distance of a wire to the nearest other one"),
-        "wire_height": ("m", "median height of the wires above the ground"),
-        "wire_curvature": ("1/km", "curvature of a wire; sag = span² curvature / 8"),
+        "wire_density": ("1/m", "conductor points per m of line"),
+        "wires": ("", "conductors side by side"),
+        "wire_spacing": ("m", "distance of a conductor to the nearest other one"),
+        "wire_height": ("m", "median height of the conductors above the ground"),
+        "wire_curvature": ("1/km", "curvature of a conductor; sag = span² curvature / 8"),
         **{f"class_{code}": ("%", f"points in class {code}") for code in CODES},
     }
 )
@@ -69,7 +72,7 @@ PROPERTIES: Mapping[str, tuple[str, str]] = MappingProxyType(
 
 
 def crop_statistics(cloud: PointCloud) -> dict[str, float]:
-    """The properties ``PROPERTIES`` of one crop; NaN where there is nothing to measure.
+    """The properties ``PROPERTIES`` of one crop; NaN if a property cannot be measured.
 
     Args:
         cloud: a crop around one tower, EDP codes.
@@ -99,15 +102,16 @@ def crop_statistics(cloud: PointCloud) -> dict[str, float]:
         },
         **_ground(xyz[np.isin(codes, GROUND)]),
         **_canopy(xyz, codes, height, len(cell)),
-        **_wires(xyz, codes, height),
+        **_conductors(xyz, codes, height),
         **{f"class_{code}": 100 * float((codes == code).mean()) for code in CODES},
     }
 
 
 def voxel_statistics(sample: VoxelSample) -> dict[str, float]:
-    """How the occupied voxels of a crop lie: shares and percentiles, no units.
+    """Distribution of the occupied voxels of a crop: shares and percentiles, without units.
 
-    Neighbours, fillings and columns, which is what models of the neighbourhood of a voxel see.
+    Numbers of neighbours, points per voxel and columns: the input of models that use the
+    neighbourhood of a voxel.
     """
     nz, ny, nx = sample.grid.shape
     grid = np.zeros((nz + 2, ny + 2, nx + 2), np.int8)
@@ -137,7 +141,8 @@ def voxel_statistics(sample: VoxelSample) -> dict[str, float]:
 def ground_elevation(xyz: np.ndarray, ground: np.ndarray) -> np.ndarray:
     """Elevation (N,) m of the ground at points (N, 3), from those that are ``ground`` (N,) bool.
 
-    Inverse-distance weights of the nearest ground returns; the least elevation where there is none.
+    Inverse-distance weights of the nearest ground returns; the lowest elevation if there is no
+    ground return.
     """
     from scipy.spatial import cKDTree
 
@@ -152,7 +157,7 @@ def ground_elevation(xyz: np.ndarray, ground: np.ndarray) -> np.ndarray:
 
 
 def line_direction(xy: np.ndarray) -> np.ndarray:
-    """Unit vector (2,) along which places (N, 2) spread most."""
+    """Unit vector (2,) of the direction in which positions (N, 2) spread most."""
     return np.linalg.svd(xy - xy.mean(axis=0), full_matrices=False)[2][0]
 
 
@@ -253,18 +258,18 @@ def _canopy(xyz: np.ndarray, codes: np.ndarray, height: np.ndarray, cells: int) 
     }
 
 
-def _wires(xyz: np.ndarray, codes: np.ndarray, height: np.ndarray) -> dict[str, float]:
+def _conductors(xyz: np.ndarray, codes: np.ndarray, height: np.ndarray) -> dict[str, float]:
     from sklearn.cluster import DBSCAN
 
     names = ("wire_density", "wires", "wire_spacing", "wire_height", "wire_curvature")
-    is_wire = np.isin(codes, WIRE)
-    if is_wire.sum() < 30:
+    is_conductor = np.isin(codes, CONDUCTOR)
+    if is_conductor.sum() < 30:
         return dict.fromkeys(names, float("nan"))
-    points = xyz[is_wire]
+    points = xyz[is_conductor]
     along_axis = line_direction(points[:, :2])
     centred = points[:, :2] - points[:, :2].mean(axis=0)
     along, across = centred @ along_axis, centred @ [-along_axis[1], along_axis[0]]
-    # What the wires have in common is taken off; what is left tells them apart.
+    # The common sag is subtracted; the rest separates the conductors.
     level = points[:, 2] - np.polyval(np.polyfit(along, points[:, 2], 2), along)
     section = np.column_stack((across, level))
     label = DBSCAN(eps=0.35, min_samples=8).fit_predict(section)
@@ -279,7 +284,7 @@ def _wires(xyz: np.ndarray, codes: np.ndarray, height: np.ndarray) -> dict[str, 
         len(points) / max(float(np.ptp(along)), 1.0),
         float(len(found)),
         float(np.median(distance.min(axis=1))) if len(centres) > 1 else float("nan"),
-        float(np.median(height[is_wire])),
+        float(np.median(height[is_conductor])),
         float(np.median(bends)) if bends else float("nan"),
     )
     return dict(zip(names, values, strict=True))

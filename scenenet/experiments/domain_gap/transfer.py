@@ -1,9 +1,10 @@
-"""What is learnt on synthetic crops is worth on real ones.
+"""How well models trained on synthetic crops do on real ones.
 
     python -m scenenet.experiments.domain_gap.transfer --real FOLDER_OF_TS40K_SAMPLES
 
-trains SCENE-Net and the boosted trees on synthetic crops alone and scores them on real ones, beside
-the same models trained on real crops with two left out at a time. Prints the table of
+trains SCENE-Net and the boosted trees on synthetic crops alone and scores them on real crops. For
+comparison, the same models are trained on real crops, two of which are left out at a time. Prints
+the table of
 docs/method/synthetic.md.
 """
 
@@ -29,7 +30,7 @@ RESOLUTION = 64
 VALIDATION = 0.3
 """Share of the synthetic crops on which tau and the seed are chosen."""
 LEFT_OUT = 2
-"""Real crops that are left out at a time."""
+"""Number of real crops left out at a time."""
 
 FIELD_MODEL = ModelSettings(
     name="scenenet-operational",
@@ -45,15 +46,15 @@ def train_scenenet(
     seeds: Sequence[int],
     settings: ModelSettings = FIELD_MODEL,
 ) -> TunedModel:
-    """The best of some seeds by validation; without validation crops by the training ones."""
+    """The best seed on the validation crops, or on the training crops if there are none."""
     tried = [train_model(settings, training, validation, seed) for seed in seeds]
-    return max(tried, key=lambda rival: rival.f05)
+    return max(tried, key=lambda tuned: tuned.f05)
 
 
 def transfer(
     real: Sequence[VoxelSample], synthetic: Sequence[VoxelSample], seeds: Sequence[int]
 ) -> pd.DataFrame:
-    """Scores on the real crops of models trained on either.
+    """Scores on real crops of models trained on synthetic and on real crops.
 
     Returns:
         a row per model and kind of training crops: model, trained_on, precision, recall, f05,
@@ -89,7 +90,7 @@ def _row(model: str, trained_on: str, counts: Confusion, curve: ThresholdCurve) 
 
 
 def voxelised(crops: Iterable[PointCloud]) -> list[VoxelSample]:
-    """Crops on the grid of the thesis."""
+    """Crops on the 64³ grid of the thesis."""
     return [
         voxelise(cloud, VoxelGrid.cube(cloud.xyz, RESOLUTION), f"{number}")
         for number, cloud in enumerate(crops)
@@ -99,12 +100,14 @@ def voxelised(crops: Iterable[PointCloud]) -> list[VoxelSample]:
 def main() -> None:
     parser = argparse.ArgumentParser(
         prog="python -m scenenet.experiments.domain_gap.transfer",
-        description="Train on synthetic crops, score on real ones, beside training on real ones.",
+        description="Train on synthetic crops, score on real crops, compare with training on real.",
     )
     parser.add_argument("--real", required=True, help="folder of TS40K samples")
     parser.add_argument("--towers", type=int, default=60, help="synthetic crops (default 60)")
     parser.add_argument("--seed", type=int, default=0, help="seed of the synthetic corridor")
-    parser.add_argument("--seeds", type=int, default=5, help="SCENE-Nets trained of each (5)")
+    parser.add_argument(
+        "--seeds", type=int, default=5, help="SCENE-Nets trained on each kind of crops (default 5)"
+    )
     arguments = parser.parse_args()
     settings = SyntheticSettings(towers=arguments.towers, seed=arguments.seed)
     table = transfer(

@@ -1,1 +1,1 @@
-"""Label noise: training on labels of which a known share is wrong (thesis 5.2.5)."""
+"""Training on labels of which a known share is wrong (thesis 5.2.5)."""

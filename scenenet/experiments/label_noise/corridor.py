@@ -1,9 +1,9 @@
-"""Crops of a synthetic line whose labels are wrong to a known share, with the truth beside."""
+"""Crops of a synthetic line with a known share of wrong labels, and with the truth."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,19 +16,19 @@ from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.corridor import Corridor
 
 STRENGTHS = tuple(np.linspace(0, 1, 26).round(2).tolist())
-"""Strengths of the annotation between which the wanted one is interpolated."""
+"""Strengths of the annotation noise; the strength for a level is interpolated between them."""
 
 
 @dataclass(frozen=True)
 class NoisyLine:
-    """The crops of a line in the order of its towers, labelled with some noise.
+    """The crops of a line with label noise, in the order of its towers.
 
     Attributes:
-        level: share of wrong tower points that was asked for.
-        strength: ``annotation_noise`` that came nearest to it.
-        share: the share there is: points labelled tower that are none, of all labelled tower.
-        labelled: the crops as annotated.
-        true: the same voxels with the truth.
+        level: requested share of mislabelled tower points.
+        strength: the ``annotation_noise`` that comes nearest to it.
+        share: actual share: mislabelled points among all points labelled tower.
+        labelled: the crops with the noisy labels.
+        true: the same voxels with the true classes.
     """
 
     level: float
@@ -41,13 +41,13 @@ class NoisyLine:
 def noisy_lines(
     settings: SyntheticSettings, levels: Sequence[float], grid: VoxelSettings
 ) -> list[NoisyLine]:
-    """One line at every level of noise; points and voxels are the same at all of them.
+    """One line at every level of noise; points and voxels are the same at every level.
 
-    A crop is every point within one tower height (planar) of a tower (thesis 5.1.3), around the
-    true towers, so that it is the same crop whatever the labels.
+    A crop is every point within one tower height (planar) of a tower (thesis 5.1.3). Crops are cut
+    around the true towers, so that they do not depend on the labels.
 
     Raises:
-        InputError: no strength of the annotation makes so many wrong labels.
+        InputError: no strength of the annotation noise reaches a level.
     """
     corridor = make_corridor(settings)
     strengths = _strengths(corridor, levels)
@@ -76,30 +76,26 @@ def noisy_lines(
     return lines
 
 
-def part_of(line: NoisyLine, first: int, last: int) -> NoisyLine:
-    """The crops of the towers from number ``first`` to before ``last``, counted from 0."""
-    return replace(line, labelled=line.labelled[first:last], true=line.true[first:last])
-
-
 def _strengths(corridor: Corridor, levels: Sequence[float]) -> list[float]:
-    """The strength of the annotation that each level takes on this line."""
+    """The strength of the annotation noise that reaches each level on this line."""
     counts = np.zeros((len(STRENGTHS), 2))
     for index in range(len(corridor)):
         made = corridor.stretch_at(index, STRENGTHS)
         counts += [_tower_counts(stretch.labels, stretch.truth) for stretch in made]
-    # Draws differ a little between strengths, so that a stronger one may do less by chance.
+    # Draws differ a little between strengths: by chance, a higher one may mislabel fewer points.
     shares = np.maximum.accumulate([_wrong_share(*both) for both in counts])
     if max(levels, default=0) > shares[-1]:
         raise InputError(
-            f"no annotation of this line makes {max(levels):.0%} of its tower points wrong; the "
-            f"strongest makes {shares[-1]:.0%}",
+            f"no annotation noise mislabels {max(levels):.0%} of the tower points of this line; "
+            f"the "
+            f"strongest mislabels {shares[-1]:.0%}",
             remedy="Set label_noise.levels lower",
         )
     return [float(np.interp(level, shares, STRENGTHS)) if level else 0.0 for level in levels]
 
 
 def _tower_counts(labels: np.ndarray, truth: np.ndarray) -> tuple[int, int]:
-    """Points labelled tower, and those of them that are none."""
+    """Numbers of points labelled tower, and of those among them that are not tower."""
     tower = labels == TOWER
     return int(tower.sum()), int((tower & (truth != TOWER)).sum())
 

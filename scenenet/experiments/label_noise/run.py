@@ -1,8 +1,8 @@
-"""Training on labels that are wrong, and scores against these labels and against the truth.
+"""Training on noisy labels, with scores against labels of the same quality and against the truth.
 
 "SCENE-Net is able to recover the body of the tower without detecting ground and power line patches
-that are mislabeled as tower" (thesis 5.2.5). There nobody knows which labels are wrong; on a
-synthetic line it is known, and how many are can be chosen.
+that are mislabeled as tower" (thesis 5.2.5). In the data of the thesis it is not known which labels
+are wrong; on a synthetic line it is known, and their share can be chosen.
 """
 
 from __future__ import annotations
@@ -10,25 +10,24 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings
 from scenenet.experiments.label_noise.corridor import NoisyLine, noisy_lines
-from scenenet.experiments.label_noise.settings import AGAINST, LABELS, SCORES, NoiseSettings
+from scenenet.experiments.label_noise.settings import AGAINST, LABELS, LabelNoiseSettings
 from scenenet.experiments.train_and_tune import TunedModel, train_and_tune
+from scenenet.metrics.score_columns import TOWER_ONLY_SCORES
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 COLUMNS = (
     "level", "share", "strength", "seed", "model", "alive", "tau",
-    *(f"{against}_{score}" for against in AGAINST for score in SCORES),
+    *(f"{against}_{score}" for against in AGAINST for score in TOWER_ONLY_SCORES),
     "wrong_detected", "validation_f05", "training_crops", "test_crops", "parameters",
     "training_seconds",
 )  # fmt: skip
@@ -36,12 +35,12 @@ COLUMNS = (
 
 @dataclass
 class Tally:
-    """What a model detects, added up over crops.
+    """Counts of detected voxels, summed over crops.
 
     Attributes:
         labels, truth: counts of voxels against the labels and against the truth.
-        wrong, wrong_detected: voxels labelled tower without a point of one, and those of them that
-            are detected.
+        wrong, wrong_detected: voxels labelled tower that contain no tower point, and how many of
+            them are detected.
     """
 
     labels: Confusion = field(default_factory=Confusion)
@@ -50,26 +49,28 @@ class Tally:
     wrong_detected: int = 0
 
     def add(self, detected: np.ndarray, labelled: VoxelSample, true: VoxelSample) -> None:
-        """Count a crop, from (V,) bool of every voxel of its grid."""
-        told, right = _towers(labelled), _towers(true)
-        self.labels += _compared(detected, told)
-        self.truth += _compared(detected, right)
-        wrong = told & ~right
+        """Count a crop; ``detected`` (V,) bool is for every voxel of its grid."""
+        labels, truth = _towers(labelled), _towers(true)
+        self.labels += _compared(detected, labels)
+        self.truth += _compared(detected, truth)
+        wrong = labels & ~truth
         self.wrong += int(wrong.sum())
         self.wrong_detected += int((wrong & detected).sum())
 
     def row(self) -> dict[str, Any]:
+        """Columns of ``COLUMNS`` that follow from the counts."""
         scores = {
-            f"{against}_{name}": float(getattr(getattr(self, against), name))
+            f"{against}_{name}": value
             for against in AGAINST
-            for name in SCORES
+            for name, value in getattr(self, against).scores().items()
+            if name in TOWER_ONLY_SCORES
         }
         share = self.wrong_detected / self.wrong if self.wrong else float("nan")
         return scores | {"alive": self.truth.tp > 0, "wrong_detected": share}
 
 
-def run_noise(
-    study: NoiseSettings,
+def train_with_label_noise(
+    settings: LabelNoiseSettings,
     models: Sequence[ModelSettings],
     voxels: VoxelSettings,
     seed: int,
@@ -77,23 +78,24 @@ def run_noise(
 ) -> pd.DataFrame:
     """Train every model from one seed at every level of noise, and write a row for each.
 
-    Labels of training and of choosing tau have the noise; a model never sees the truth. A row of
-    ``LABELS`` says at each level how good the labels are.
+    The labels for training and for the choice of tau are noisy; a model never sees the truth. At
+    each level a row named ``LABELS`` has the scores of the labels themselves.
 
     Args:
-        models: those that take part beside the boosted trees.
+        settings: levels, line, and numbers of towers to train and tune on.
+        models: the models that take part in addition to the boosted trees.
+        voxels: grid of the crops.
+        seed: of the line and of every training.
         out: CSV file, columns ``COLUMNS``.
 
     Returns:
-        what was written.
+        the table that was written.
 
     Raises:
-        InputError: a level cannot be reached, or there is nothing to learn from.
+        InputError: a level cannot be reached, or no training crop has a tower.
     """
-    import pandas as pd
-
-    lines = noisy_lines(study.line_of(seed), study.levels, voxels)
-    rows = list(_rows(lines, study, models, seed))
+    lines = noisy_lines(settings.line_of(seed), settings.levels, voxels)
+    rows = list(_rows(lines, settings, models, seed))
     table = pd.DataFrame(rows)[list(COLUMNS)]
     with atomic(out) as partial:
         table.to_csv(partial, index=False, float_format="%.6g")
@@ -101,14 +103,17 @@ def run_noise(
 
 
 def _rows(
-    lines: Sequence[NoisyLine], study: NoiseSettings, models: Sequence[ModelSettings], seed: int
+    lines: Sequence[NoisyLine],
+    study: LabelNoiseSettings,
+    models: Sequence[ModelSettings],
+    seed: int,
 ) -> Iterator[dict[str, Any]]:
-    """One tower behind the training part and one behind the validation part are left out, so that
-    no crop has a neighbour in another part."""
+    """One tower after the training part and one after the validation part are left out, so that no
+    crop has a neighbour in another part."""
     tuned_from = study.training + 1
     tested_from = tuned_from + study.validation + 1
     plans = [(line, settings) for line in lines for settings in [*models, None]]
-    for number, (line, settings) in enumerate(track(plans, f"noise, seed {seed}: trainings")):
+    for number, (line, settings) in enumerate(track(plans, f"label noise, seed {seed}: trainings")):
         tests = list(zip(line.labelled[tested_from:], line.true[tested_from:], strict=True))
         facts = {
             "level": line.level,
@@ -120,23 +125,23 @@ def _rows(
         if number % (len(models) + 1) == 0:
             yield dict.fromkeys(COLUMNS) | facts | {"model": LABELS} | _tallied(_towers, tests)
         training = line.labelled[: study.training]
-        rival = train_and_tune(
+        tuned = train_and_tune(
             settings, training, line.labelled[tuned_from : tested_from - 1], seed
         )
 
-        def detect(sample: VoxelSample, rival: TunedModel = rival) -> np.ndarray:
-            return rival.answer(sample)[0] >= rival.tau
+        def detect(sample: VoxelSample, tuned: TunedModel = tuned) -> np.ndarray:
+            return tuned.answer(sample)[0] >= tuned.tau
 
         yield (
             facts
             | _tallied(detect, tests)
             | {
                 "model": BOOSTED_TREES if settings is None else settings.name,
-                "tau": rival.tau,
-                "validation_f05": rival.f05,
+                "tau": tuned.tau,
+                "validation_f05": tuned.f05,
                 "training_crops": len(training),
-                "parameters": rival.parameters,
-                "training_seconds": rival.seconds,
+                "parameters": tuned.parameters,
+                "training_seconds": tuned.seconds,
             }
         )
 
@@ -151,7 +156,7 @@ def _tallied(
 
 
 def _towers(sample: VoxelSample) -> np.ndarray:
-    """(V,) bool, the towers of a sample."""
+    """(V,) bool: voxels of a sample that are labelled tower."""
     return sample.spread(sample.tower)[1]
 
 

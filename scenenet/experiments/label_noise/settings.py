@@ -7,43 +7,45 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenenet.core.settings import Settings
-from scenenet.experiments.contenders import Contender, _fault
+from scenenet.experiments.contenders import Contender, fault_of
 from scenenet.models.settings import Positive
 from scenenet.synthetic.settings import SyntheticSettings
 
 AGAINST = ("labels", "truth")
-"""What a model that was trained on wrong labels is scored against."""
-SCORES = ("precision", "recall", "f05", "iou_tower")
+"""What the predictions of a model are compared with."""
 LABELS = "the labels"
-"""What tables call the labels themselves, as if they were the answer of a model."""
+"""Name in the column `model` of the labels themselves, scored as if a model had predicted them."""
 
 Seed = Annotated[int, Field(ge=0)]
 Level = Annotated[float, Field(ge=0, lt=1)]
 
 
-class NoiseSettings(Settings):
-    """Training on labels of which a known share is wrong (thesis 5.2.5), on synthetic lines whose
-    truth is known."""
+class LabelNoiseSettings(Settings):
+    """Training on labels of which a known share is wrong (thesis 5.2.5), on synthetic lines, where
+    the truth is known."""
 
     levels: tuple[Level, ...] = Field(
-        (), description="share of the points labelled tower that are none; none for no such study"
+        (), description="shares of mislabelled tower points, each below 1; empty for no label noise"
     )
     seeds: tuple[Seed, ...] = Field(
-        (0, 1, 2), min_length=1, description="each has a line of its own and trains every model"
+        (0, 1, 2),
+        min_length=1,
+        description="every model is trained once per seed, on the line of that seed",
     )
     line: dict[str, Any] = Field(
         default_factory=dict,
-        description="the line, where it is another than 24 towers of seed 100, to which the seeds "
-        "above are added; settings as in synthetic.surveys",
+        description="settings of the synthetic line as in synthetic.surveys; by default 24 "
+        "towers and seed 100, to which each of the seeds above is added",
     )
-    training: Positive = Field(6, description="towers to train on, from the start of the line")
+    training: Positive = Field(6, description="training towers, from the start of the line")
     validation: Positive = Field(
         3,
-        description="towers to choose tau on; one before and one behind them are left out, and the "
-        "rest of the line is tested on",
+        description="validation towers, on which tau is chosen; one tower before and one after "
+        "them is left out, and the rest of the line is for tests",
     )
     contenders: tuple[Contender, ...] = Field(
-        (), description="models that take part beside the boosted trees; none for every model"
+        (),
+        description="models that take part in addition to the boosted trees; empty for every model",
     )
 
     @model_validator(mode="after")
@@ -51,7 +53,7 @@ class NoiseSettings(Settings):
         try:
             towers = self.line_of(0).towers
         except ValidationError as error:
-            raise ValueError(f"label_noise.line: {_fault(error)}") from None
+            raise ValueError(f"label_noise.line: {fault_of(error)}") from None
         if towers < self.training + self.validation + 3:
             raise ValueError(
                 f"label_noise: {towers} towers are too few for {self.training} to train on, "
@@ -62,6 +64,6 @@ class NoiseSettings(Settings):
         return self
 
     def line_of(self, seed: int) -> SyntheticSettings:
-        """The line of one of the seeds; its annotation noise is yet to be found."""
+        """The synthetic line of one of the seeds, without annotation noise yet."""
         line = SyntheticSettings(**({"towers": 24, "seed": 100} | self.line))
         return line.model_copy(update={"seed": line.seed + seed})

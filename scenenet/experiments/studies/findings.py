@@ -1,45 +1,43 @@
-"""What a study came to, in sentences that follow from its numbers by rule."""
+"""The findings of a study, in sentences that follow from its numbers by rule."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from scenenet.experiments.studies.settings import StudySettings
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 ERRORS = 2.0
-"""Standard errors of a difference within which two means over seeds are not told apart."""
+"""Two means over seeds within so many standard errors of their difference are called equal."""
 NAMED = 3
-"""As many variants are called by name; of more there is only the number."""
+"""Up to so many variants are listed by name; for more there is only their number."""
 
 
 def findings(study: StudySettings, summary: pd.DataFrame) -> str:
-    """Best and lowest variant, which are as good as the best, which die, which end negative.
+    """Best and lowest variant; variants equal to the best; dead models; negative parameters.
 
     Args:
         summary: of ``scenenet.experiments.studies.summary``, or as it was written.
     """
     if summary["f05"].max() <= 0:
-        return "None of them finds a tower voxel."
+        return "No variant detects a tower voxel."
     best = summary.loc[summary["f05"].idxmax()]
     lowest = summary.loc[summary["f05"].idxmin()]
-    said = [f"Best here: {_scored(best)}. Lowest: {_scored(lowest)}."]
+    sentences = [f"Best: {_scored(best)}. Lowest: {_scored(lowest)}."]
     if len(study.seeds) == 1:
-        said.append("One seed, so what the seed does is not known.")
+        sentences.append("There is one seed, so the spread over seeds is unknown.")
     else:
         near = summary.loc[as_good_as_best(summary), "variant"].drop(index=best.name)
         others = len(summary) - 1
-        said.append(
-            f"As good as the best within {ERRORS:g} standard errors: {_named(list(near), others)}."
+        sentences.append(
+            f"Equal to the best within {ERRORS:g} standard errors: {_named(list(near), others)}."
         )
     dead = summary[summary["alive"] < summary["n_seeds"]]
     if len(dead):
         each = [f"{r.variant} ({r.n_seeds - r.alive} of {r.n_seeds})" for r in dead.itertuples()]
-        said.append(f"Dead after training: {_named(each, len(summary))}.")
-    return " ".join([*said, *_negative(summary)])
+        sentences.append(f"Dead models: {_named(each, len(summary))}.")
+    return " ".join([*sentences, *_negative(summary)])
 
 
 def as_good_as_best(summary: pd.DataFrame) -> pd.Series:
@@ -54,21 +52,21 @@ def as_good_as_best(summary: pd.DataFrame) -> pd.Series:
 
 
 def _negative(summary: pd.DataFrame) -> list[str]:
-    """A sentence where the variants differ in how often a negative number is left."""
+    """A sentence if the variants differ in how often training ends with a negative parameter."""
     known = summary.dropna(subset="negative_share")
     shares = known["negative_share"]
     if not len(shares) or shares.min() == shares.max() or len(known) > NAMED + 1:
         return []
     each = [
-        f"{r.variant} {round(r.negative_share * r.n_seeds)} of {r.n_seeds} seeds"
+        f"{r.variant} ({round(r.negative_share * r.n_seeds)} of {r.n_seeds} seeds)"
         for r in known.itertuples()
     ]
-    return [f"A number below zero is left by: {', '.join(each)}."]
+    return [f"Ends with a negative parameter: {', '.join(each)}."]
 
 
 def _scored(row: pd.Series) -> str:
     spread = "" if row["f05_std"] != row["f05_std"] else f" ± {row['f05_std']:.2f}"
-    return f"{row['variant']} with an F0.5 of {row['f05']:.2f}{spread}"
+    return f"{row['variant']} with F0.5 {row['f05']:.2f}{spread}"
 
 
 def _named(variants: Sequence[str], others: int) -> str:

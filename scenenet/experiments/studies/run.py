@@ -1,4 +1,4 @@
-"""The trainings of a study, one after the other, and their scores."""
+"""Run a study: train and score every variant from every seed."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
 import torch
 
 from scenenet.core.errors import InputError
@@ -19,6 +20,7 @@ from scenenet.dataset.crops import read_crops
 from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings, voxelise
 from scenenet.experiments.studies.settings import Plan, StudySettings
+from scenenet.metrics.score_columns import SCORES
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.base import VoxelModel
@@ -28,11 +30,8 @@ from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import ModelSettings
 from scenenet.training.train import LostTraining, fit
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 COLUMNS = (
-    "variant", "seed", "kind", "alive", "tau", "precision", "recall", "f05", "iou_tower", "miou",
+    "variant", "seed", "kind", "alive", "tau", *SCORES,
     "average_precision", "validation_f05", "training_crops", "parameters", "epochs", "loss",
     "lowest_weight", "lowest_shape", "training_seconds", "inference_ms",
 )  # fmt: skip
@@ -50,25 +49,23 @@ def run_study(
 ) -> pd.DataFrame:
     """Train and score every variant from every seed, and write a row for each.
 
-    tau is chosen on the validation crops, as the variant is scored: after ``applied`` changes.
-    Variants that differ only in those share their trainings. A training that loses its way ends
-    with a model that finds nothing: its row is that of a dead one, without a loss.
+    tau is chosen on the validation crops after the ``applied`` changes, as for the scores. Variants
+    that differ only in ``applied`` changes share their trainings. A training that diverges counts
+    as a dead model: its row has no loss.
 
     Args:
         crop_manifests: of the crop stores.
-        study: what to vary.
-        model, voxels, split: what is varied.
+        study: the variants and seeds.
+        model, voxels, split: the settings that the variants change.
         out: CSV file, columns ``COLUMNS``; ``lowest_weight`` and ``lowest_shape`` are the lowest
             mixing weight and shape parameter of a SCENE-Net after training.
 
     Returns:
-        what was written.
+        the table that was written.
 
     Raises:
         InputError: there are too few crops, or a variant cannot be trained.
     """
-    import pandas as pd
-
     data = _Crops(crop_manifests)
     trained: dict[Any, tuple[VoxelModel | None, dict[str, Any]]] = {}
     rows = []
@@ -94,7 +91,7 @@ def run_study(
 
 
 class _Crops:
-    """The crops on whatever grids and in whatever parts the variants ask for."""
+    """The crops on the grids and in the parts that the variants need."""
 
     def __init__(self, manifests: Sequence[str | Path]) -> None:
         self._manifests = list(manifests)
@@ -110,8 +107,8 @@ class _Crops:
         return self._parts[settings]
 
     def samples(self, grid: VoxelSettings, ids: Sequence[str]) -> list[VoxelSample]:
-        """The crops called ``ids`` on ``grid``. Voxelising takes less than reading voxels does, so
-        they are made from the points, once for each grid, one crop in memory at a time."""
+        """The crops ``ids`` on ``grid``. They are voxelised from their points, once per grid and
+        one crop in memory at a time, because that is faster than reading voxels."""
         if grid not in self._grids:
             self._grids[grid] = {
                 crop.id: voxelise(cloud, grid.grid(cloud.xyz), crop.id)
@@ -124,7 +121,7 @@ class _Crops:
 def _trained(
     training: Sequence[VoxelSample], settings: ModelSettings, seed: int
 ) -> tuple[VoxelModel | None, dict[str, Any]]:
-    """The model, None where its training lost its way, and what is known of the training."""
+    """The model (None if its training diverged), and columns about the training."""
     begin = time.perf_counter()
     try:
         model, history = fit(training, [], settings, seed)
@@ -142,7 +139,8 @@ def _trained(
 
 
 def _lowest(model: VoxelModel) -> dict[str, float]:
-    """Below zero they break the convexity that the loss is to keep (thesis 4.5, 5.3.3)."""
+    """The lowest parameters; negative ones break the convexity that the loss enforces (thesis 4.5,
+    5.3.3)."""
     if not isinstance(model, GeneoModel):
         return dict.fromkeys(LOWEST, math.nan)
     numbers = model.shape_parameters()

@@ -1,4 +1,4 @@
-"""What a study varies, and the settings of each of its trainings."""
+"""Settings of a study: what it varies, and the settings of each of its trainings."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from scenenet.models.settings import KernelSize, ModelSettings
 
 
 class Variant(Settings):
-    """One way to train, by what it changes."""
+    """One way to train, given by the settings that it changes."""
 
-    name: str = Field(min_length=1, description="how tables and figures call it")
+    name: str = Field(min_length=1, description="name in tables and figures")
     changes: dict[str, Any] = Field(
         default_factory=dict,
-        description="dotted settings and their values: those of a model (training.loss.alpha), of "
-        "voxels. and split., and applied.kernel_size, applied.resolution for what is changed "
-        "between training and scoring",
+        description="dotted settings and their values: of the model (training.loss.alpha), of the "
+        "voxels (voxels.resolution), of the split (split.train), or changed between training and "
+        "scoring (applied.kernel_size, applied.resolution)",
     )
     thesis: str | None = Field(
-        None, description="entry of the published numbers that it stands beside: ablation.a"
+        None, description="group of published numbers to compare with, such as ablation.a"
     )
 
 
@@ -34,20 +34,24 @@ class StudySettings(Settings):
 
     name: str = Field(pattern=r"^[a-z][a-z0-9-]*$", description="name in files and in MLflow")
     title: str = Field(description="heading in the report")
-    place: str = Field(description="where the thesis asks the same")
-    asks: str = Field(description="the question, as a sentence")
-    thesis_says: str | None = Field(None, description="what the thesis found, as a sentence")
-    model: str = Field("scenenet", description="name of the model that is varied")
-    seeds: tuple[int, ...] = Field((0, 1, 2), min_length=1, description="seeds of every variant")
-    part: Literal["validation", "test"] = Field("test", description="crops that are scored")
-    common: dict[str, Any] = Field(
-        default_factory=dict, description="changes that all variants share, as in variants"
+    place: str = Field(description="section or table of the thesis with the same question")
+    asks: str = Field(description="the question, as one sentence")
+    thesis_says: str | None = Field(None, description="the finding of the thesis, as one sentence")
+    model: str = Field("scenenet", description="name of the model whose settings are varied")
+    seeds: tuple[int, ...] = Field(
+        (0, 1, 2), min_length=1, description="seeds from which every variant is trained"
     )
-    variants: tuple[Variant, ...] = Field((), description="what is compared")
+    part: Literal["validation", "test"] = Field(
+        "test", description="crops on which the models are scored"
+    )
+    common: dict[str, Any] = Field(
+        default_factory=dict, description="changes that all variants have in common"
+    )
+    variants: tuple[Variant, ...] = Field((), description="the ways to train that are compared")
     vary: dict[str, tuple[Any, ...]] = Field(
         default_factory=dict,
-        description="dotted settings and the values of each; every combination is a variant, after "
-        "those that are spelt out",
+        description="dotted settings and the values of each; every combination is a variant, in "
+        "addition to those listed in variants",
     )
 
     @model_validator(mode="after")
@@ -56,18 +60,18 @@ class StudySettings(Settings):
             raise ValueError(f"study {self.name}: give variants, or vary, or both")
         names = [variant.name for variant in self.all_variants()]
         if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"study {self.name}: {', '.join(twice)} is there more than once")
+            raise ValueError(f"study {self.name}: {', '.join(twice)} is listed more than once")
         return self
 
     def all_variants(self) -> tuple[Variant, ...]:
-        """The variants, those of ``vary`` last and in the order of its values."""
+        """The variants: those of ``variants``, then the combinations of ``vary`` in their order."""
         combinations = product(*self.vary.values()) if self.vary else ()
         varied = (_named(dict(zip(self.vary, values, strict=True))) for values in combinations)
         return (*self.variants, *varied)
 
     @property
     def is_grid(self) -> bool:
-        """Whether the variants are all combinations of two settings, and nothing else."""
+        """Whether the variants are exactly the combinations of two settings."""
         return len(self.vary) == 2 and not self.variants
 
     def plans(
@@ -76,7 +80,7 @@ class StudySettings(Settings):
         """The settings of each variant.
 
         Raises:
-            ValueError: a variant changes a setting that does not exist, or to what it cannot be.
+            ValueError: a variant changes a setting that does not exist, or to an invalid value.
         """
         return [
             _plan(
@@ -96,9 +100,9 @@ class Plan:
 
     Attributes:
         name: of the variant.
-        model, voxels, split: what it trains, and on what.
-        applied_size: (kz, ky, kx) that the kernels are sampled at after training; None to leave it.
-        applied_voxels: grid that it is scored on.
+        model, voxels, split: settings of the model and of its data.
+        applied_size: (kz, ky, kx) at which kernels are sampled after training; None for no change.
+        applied_voxels: grid on which the model is scored.
     """
 
     name: str
@@ -125,7 +129,9 @@ def _plan(
             groups["model"][dotted] = value
     unknown = groups["applied"].keys() - {"kernel_size", "resolution"}
     if unknown:
-        raise ValueError(f"study {study}, {variant.name}: applied.{min(unknown)} is no setting")
+        raise ValueError(
+            f"study {study}, {variant.name}: there is no setting applied.{min(unknown)}"
+        )
     try:
         trained = changed(voxels, groups["voxels"])
         size, resolution = (groups["applied"].get(name) for name in ("kernel_size", "resolution"))
@@ -151,5 +157,5 @@ def _named(changes: dict[str, Any]) -> Variant:
 def _written(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "x".join(map(str, value))
-    # Written out, as the thesis does: 0.00001 and not 1e-05.
+    # As in the thesis: 0.00001 and not 1e-05.
     return f"{value:.12f}".rstrip("0").rstrip(".") if isinstance(value, float) else f"{value}"

@@ -1,34 +1,30 @@
-"""A study in one table: mean and spread over seeds, the thesis' numbers beside."""
+"""Table of a study: mean and spread over seeds, with the numbers of the thesis."""
 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+
+import pandas as pd
 
 from scenenet.experiments.published import Published, Thesis
 from scenenet.experiments.studies.settings import StudySettings
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
-PUBLISHED = ("precision", "recall", "miou")
+from scenenet.metrics.score_columns import PUBLISHED_SCORES, SCORES
 
 
 def summarise(study: StudySettings, runs: pd.DataFrame, thesis: Thesis) -> pd.DataFrame:
     """One row per variant, in their order.
 
     Args:
+        study: the variants and their places in the thesis.
         runs: of ``run_study``.
+        thesis: published numbers.
 
     Returns:
-        variant, n_seeds; alive, how many of these, and live_share; mean and ``_std`` of each score
-        over all seeds; mean of parameters, training_crops, training_seconds, inference_ms;
-        negative_share of the seeds that end with a negative number, and the lowest of all;
-        ``thesis_`` columns of what is published.
+        variant, n_seeds; alive (number of live models) and live_share; mean and ``_std`` of each
+        score over all seeds; mean of parameters, training_crops, training_seconds, inference_ms;
+        negative_share (seeds that end with a negative parameter); lowest_weight and lowest_shape
+        over all seeds; ``thesis_`` columns with the published scores.
     """
-    import pandas as pd
-
     rows = []
     for variant in study.all_variants():
         group = runs[runs["variant"] == variant.name]
@@ -45,7 +41,7 @@ def summarise(study: StudySettings, runs: pd.DataFrame, thesis: Thesis) -> pd.Da
         lowest = group[["lowest_weight", "lowest_shape"]].min(axis=1).dropna()
         row["negative_share"] = (lowest < 0).mean() if len(lowest) else math.nan
         row |= {name: group[name].min() for name in ("lowest_weight", "lowest_shape")}
-        for name in PUBLISHED:
+        for name in PUBLISHED_SCORES:
             number = thesis.number(f"{variant.thesis}.{name}") or Published(place="")
             row |= {f"thesis_{name}": number.value, f"thesis_{name}_std": number.spread}
         rows.append(row)

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from scenenet.figures.plots.style import COLOURS, legend, new_figure, readable, save
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Curve = Mapping[str, Sequence[float]]
 """Lists ``precision`` and ``recall`` of one length, tau ascending, as evaluation writes them."""

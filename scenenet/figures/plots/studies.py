@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import pandas as pd
 
 from scenenet.figures.plots.style import COLOURS, legend, new_figure, save
-
-if TYPE_CHECKING:
-    import pandas as pd
-
-MEASURES = {"precision": "precision", "recall": "recall", "f05": "F0.5"}
+from scenenet.metrics.score_columns import CHART_SCORES
 
 
 def rows(summary: pd.DataFrame, out: str | Path) -> str:
@@ -25,7 +21,7 @@ def rows(summary: pd.DataFrame, out: str | Path) -> str:
     places = np.arange(len(summary))
     figure, axes = new_figure(1, 1, width=7.2, height=0.42 * len(summary) + 1.3)
     axis = axes[0, 0]
-    for i, (name, label) in enumerate(MEASURES.items()):
+    for i, (name, label) in enumerate((c.name, c.label) for c in CHART_SCORES):
         at = places + 0.22 * (i - 1)
         style = {"color": COLOURS[i], "capsize": 2}
         spread = summary[f"{name}_std"].fillna(0)

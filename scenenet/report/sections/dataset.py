@@ -1,47 +1,49 @@
-"""The sections on what was learned from: surveys, towers, voxels (thesis 5.1)."""
+"""The sections on the data: surveys, labelled towers, voxels (thesis 5.1)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import pandas as pd
+
 from scenenet.report.blocks import Block, Column, Notes, Section, Table, table
-from scenenet.report.context import Material
+from scenenet.report.context import ReportContext
 
 
-def data(material: Material) -> Section | None:
+def data(context: ReportContext) -> Section | None:
     """Surveys and Table 5.1."""
-    checks = material.results.checks()
+    checks = context.results.checks()
     blocks: list[Block] = [_survey_list(checks)] if checks else []
     for survey, report in checks.items():
         if warnings := [_warning(item) for item in report.get("warnings", [])]:
-            blocks.append(Notes(f"The check of {survey} warns", warnings))
-    classes = material.table("classes")
+            blocks.append(Notes(f"Warnings of the check of {survey}", warnings))
+    classes = context.table("classes")
     if classes is not None:
         columns = [
             Column("code", "code", "count"),
             Column("class", "class"),
             Column("points", "points", "count"),
             Column("share_percent", "share [%]", "percent"),
-            Column("lowest_percent", "lowest survey [%]", "percent"),
-            Column("highest_percent", "highest survey [%]", "percent"),
+            Column("lowest_percent", "lowest share [%]", "percent"),
+            Column("highest_percent", "highest share [%]", "percent"),
             Column("thesis_percent", "thesis [%]", "percent", published=True),
         ]
         caption = (
-            f"Share of each class in all points of {_listed(material.results.surveys)}, beside "
-            "thesis Table 5.1. The thesis' data are strips along lines of EDP in Portugal; the "
-            "shares agree only as far as the surveys are alike."
+            f"Share of each class in all points of {_listed(context.results.surveys)}, with the "
+            "shares of thesis Table 5.1. The thesis used strips along lines of EDP in Portugal; "
+            "the shares can agree only if the surveys are similar."
         )
         blocks.append(table(classes, columns, caption, "tables/classes.csv"))
-    for survey in material.results.surveys:
-        blocks += material.figures_of(survey, "data")
-    blocks += material.figures("data")
+    for survey in context.results.surveys:
+        blocks += context.figures_of(survey, "data")
+    blocks += context.figures("data")
     return Section("data", "The surveys", blocks) if blocks else None
 
 
-def towers(material: Material) -> Section | None:
+def towers(context: ReportContext) -> Section | None:
     """Thesis 5.1.2."""
-    frame = material.table("towers")
+    frame = context.table("towers")
     if frame is None:
         return None
     columns = [
@@ -56,41 +58,40 @@ def towers(material: Material) -> Section | None:
         Column("thesis_highest", "thesis highest", "number", published=True),
     ]
     caption = (
-        "Towers found by DBSCAN in the points labelled tower, mean and standard deviation over "
-        "towers, beside thesis 5.1.2. Spacing is to the next tower along the line."
+        "Towers found by DBSCAN in the points labelled tower: mean and standard deviation over "
+        "towers, with the values of thesis 5.1.2. Spacing is the distance to the next tower of the "
+        "line."
     )
-    maps = [f for survey in material.results.surveys for f in material.figures_of(survey, "towers")]
+    maps = [f for survey in context.results.surveys for f in context.figures_of(survey, "towers")]
     return Section("towers", "The labelled towers", [
         table(frame.fillna({"unit": ""}), columns, caption, "tables/towers.csv"), *maps,
     ])  # fmt: skip
 
 
-def voxels(material: Material) -> Section | None:
+def voxels(context: ReportContext) -> Section | None:
     """Thesis 5.1.4."""
-    frame = material.table("voxelisation")
-    blocks = material.figures("voxels")
+    frame = context.table("voxelisation")
+    blocks = context.figures("voxels")
     if frame is not None:
         columns = [
             Column("grid", "grid"),
             Column("samples", "crops", "count"),
-            Column("seconds", "time a crop", "seconds", "seconds_std"),
-            Column("thesis_seconds", "thesis, time a crop", "seconds", published=True),
+            Column("seconds", "time per crop", "seconds", "seconds_std"),
+            Column("thesis_seconds", "thesis, time per crop", "seconds", published=True),
             Column("occupied_voxels", "occupied voxels", "count"),
             Column("tower_voxels", "tower voxels", "count"),
-            Column("tower_share_percent", "towers in the occupied [%]", "share"),
+            Column("tower_share_percent", "tower voxels among the occupied [%]", "share"),
         ]
         caption = (
-            "Voxelised crops: mean time without reading files, and mean number of voxels. The "
-            "thesis' times (5.1.4) are of an Intel CPU of the 8th generation; ours are of the "
-            "machine this ran on."
+            "Voxelisation of a crop: mean time without reading files, and mean number of voxels. "
+            "The times of the thesis (5.1.4) are for an Intel CPU of the 8th generation, those of "
+            "this run for the machine that it ran on."
         )
         blocks = [table(frame, columns, caption, "tables/voxelisation.csv"), *blocks]
     return Section("voxels", "Voxels", blocks) if blocks else None
 
 
 def _survey_list(checks: Mapping[str, Mapping[str, Any]]) -> Table:
-    import pandas as pd
-
     columns = [
         Column("survey", "survey"),
         Column("n_points", "points", "count"),
@@ -101,8 +102,12 @@ def _survey_list(checks: Mapping[str, Mapping[str, Any]]) -> Table:
     ]
     facts = [{"survey": name} | {c.name: report.get(c.name) for c in columns[1:]}
              for name, report in checks.items()]  # fmt: skip
-    frame = pd.DataFrame(facts).fillna({"crs": "none", "codes": "not said"})
-    return table(frame, columns, "Every survey that was checked, those only classified included.")
+    frame = pd.DataFrame(facts).fillna({"crs": "none", "codes": "not given"})
+    return table(
+        frame,
+        columns,
+        "Every survey of the run: training data and surveys that are only classified.",
+    )
 
 
 def _warning(item: str | Mapping[str, str]) -> str:

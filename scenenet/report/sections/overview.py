@@ -1,124 +1,160 @@
-"""The opening of the page: what a person wants to know first."""
+"""The opening of the report: what was measured, how good the model is, how others compare."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import pandas as pd
+
+from scenenet.metrics.score_columns import AT_TAU, SCORE_COLUMNS, VOXELS, WHOLE_TOWERS
 from scenenet.report.blocks import Block, Facts, Section, Text, write
-from scenenet.report.context import Material
+from scenenet.report.context import ReportContext
 from scenenet.results.folder import BOOSTED_TREES
-from scenenet.results.score_tables import TRIVIAL, WHOLE_TOWERS
+from scenenet.results.score_tables import TRIVIAL
 
-if TYPE_CHECKING:
-    import pandas as pd
+SAME = 0.02
+"""F0.5 scores that differ by less are called equal."""
 
-NEAR = 0.02
-"""F0.5 scores that differ by less are called the same."""
+PARTS = {AT_TAU: "tau", WHOLE_TOWERS: "towers"}
+"""Way to count -> beginning of its columns in ``tables/whole_towers.csv``."""
 
 
-def overview(material: Material) -> Section:
-    """The model that predicts, and in a sentence each how the others compare."""
-    models = material.table("models")
-    results = material.results
+def overview(context: ReportContext) -> Section:
+    """The model that classifies surveys, and one sentence for each other model."""
+    models = context.table("models")
+    results = context.results
     facts: list[tuple[str, str]] = []
     blocks: list[Block] = [Text("No model has been evaluated in this run.")]
     if models is not None:
-        first = _speaking(models, results.predicting or models["model"].iloc[0])
-        blocks = [Text(_headline(material, models, first))]
+        first = _representative(models, results.predicting or models["model"].iloc[0])
         others = [
-            _compared(material, _speaking(models, name), first)
+            _representative(models, name)
             for name in dict.fromkeys([*results.models, BOOSTED_TREES])
             if name != first["model"] and (models["model"] == name).any()
         ]
-        blocks += [Text(sentence) for sentence in others]
+        blocks = [Text(_task(context, first)), Text(_headline(context, first))]
+        blocks += [Text(_comparison(context, other, first)) for other in others]
+        blocks.append(Text(_terms(models)))
         facts = [
-            (f"precision, {first['model']}", write(first["precision"], "score")),
-            ("recall", write(first["recall"], "score")),
-            ("F0.5", write(first["f05"], "score")),
-            ("IoU tower", write(first["iou_tower"], "score")),
+            (f"{column.label} of {first['model']}", write(first[column.name], "score"))
+            for column in SCORE_COLUMNS
+            if column.tower_only
         ]
         facts += [
-            (f"seeds of {model} that detect anything", f"{sum(r.alive for r in of)} of {len(of)}")
+            (f"live models, {model}", f"{sum(r.alive for r in of)} of {len(of)}")
             for model in results.models
             if (of := results.of_model(model))
         ]
     predicted = [p for survey in results.predicted if (p := results.prediction(survey))]
     if predicted:
         found = sum(len(towers["features"]) for _, towers in predicted)
-        facts.append(("towers in the classified surveys", write(found, "count")))
-    return Section("overview", "In short", [blocks[0], Facts(facts), *blocks[1:]])
+        facts.append(("towers found in new surveys", write(found, "count")))
+    return Section("overview", "Summary", [*blocks[:2], Facts(facts), *blocks[2:]])
 
 
-def _headline(material: Material, models: pd.DataFrame, first: Mapping[Any, Any]) -> str:
-    n_crops = material.results.of_model(first["model"])[0].evaluation["voxel"]["n_samples"]
+def _task(context: ReportContext, first: Mapping[Any, Any]) -> str:
+    """What was trained and what was tested."""
+    n_crops = context.results.of_model(first["model"])[0].evaluation["voxel"]["n_samples"]
+    return (
+        "This run trains models to find the towers of power lines in airborne LiDAR point clouds. "
+        "The points around each labelled tower are cut out (a crop) and put on a grid of voxels; a "
+        "model gives each voxel the probability that it is part of a tower. All scores below are "
+        f"measured on {n_crops} test crops that were not used to train or tune any model."
+    )
+
+
+def _headline(context: ReportContext, first: Mapping[Any, Any]) -> str:
+    return (
+        f"{first['model']}, {_kind(context, first)}, classifies the new surveys. Of the voxels it "
+        f"predicts as tower, {first['precision']:.0%} are labelled tower (precision); it finds "
+        f"{first['recall']:.0%} of the labelled tower voxels (recall). The numbers are for "
+        f"{_seeds(first)} and count {_counted(first)}."
+    )
+
+
+def _comparison(context: ReportContext, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
+    """The scores of another model, compared with the first one counted in the same way."""
+    name = f"{other['model']}, {_kind(context, other)},"
+    if not other["recall"]:
+        return f"{name} detects no tower voxel."
+    scores = (
+        f"{name} has precision {other['precision']:.2f} and recall {other['recall']:.2f} "
+        f"({_seeds(other)}; {_counted(other)})."
+    )
+    if other["voxels"] == first["voxels"]:
+        return f"{scores} {_difference(other['f05'], first['f05'], str(first['model']))}"
+    return f"{scores}{_same_way(context, other, first)}"
+
+
+def _difference(other: float, first: float, name: str) -> str:
+    difference = other - first
+    if abs(difference) < SAME:
+        verdict = f"equal to {name}"
+    else:
+        verdict = f"{abs(difference):.2f} {'above' if difference > 0 else 'below'} {name}"
+    return f"Its F0.5 of {other:.2f} is {verdict}."
+
+
+def _same_way(context: ReportContext, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
+    """Both models scored the same way, if their own ways differ."""
+    frame = context.table("whole_towers")
+    if frame is None:
+        return ""
+    rows = frame.set_index("model")
+    seeds = int(rows.loc[first["model"], "n_seeds"])
+    pairs = []
+    for voxels in reversed(VOXELS):
+        ours, reference = (rows.loc[row["model"], f"{PARTS[voxels]}_f05"] for row in (other, first))
+        pairs.append(f"{ours:.2f} against {reference:.2f} for {first['model']} ({voxels})")
+    seeds_said = "one seed" if seeds == 1 else f"mean of {seeds} seeds"
+    return f" Scored the same way, {seeds_said}: F0.5 {' and '.join(pairs)}."
+
+
+def _terms(models: pd.DataFrame) -> str:
+    """What a reader needs to know to read the scores."""
     trivial = models.loc[models["model"] == TRIVIAL, "miou"].iloc[0]
     return (
-        f"Scores are of {n_crops} test crops that no model was trained or tuned on. "
-        f"{first['model']} ({first['counted']}), {_what(material, first)}, is the model that "
-        f"predicts. It reaches a precision of {first['precision']:.2f} at a recall of "
-        f"{first['recall']:.2f} over {_decision(first)}. A model that never "
-        f"says tower has a mean IoU of {trivial:.2f}, because the "
-        "mean is over background and tower; the IoU of the tower alone stands beside it "
-        "everywhere."
+        "F0.5 combines precision and recall and gives precision twice the weight. Each model has a "
+        "threshold tau for its probability, chosen on validation crops. Two ways to count are "
+        "reported: the voxels with a probability at or above tau, as in the thesis, and all voxels "
+        "of the whole towers that are found with them. The IoU of the thesis is the mean over "
+        f"background and tower: a model that never predicts tower already scores {trivial:.2f}. "
+        "Therefore the IoU of the tower class alone is always given as well."
     )
 
 
-def _compared(material: Material, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
-    who = f"{other['model']} ({other['counted']}), {_what(material, other)},"
-    if not other["recall"]:
-        return f"{who} finds no voxel of a tower."
-    apart = other["f05"] - first["f05"]
-    if abs(apart) < NEAR:
-        beside = f"as good as {first['model']}"
-    else:
-        beside = f"{abs(apart):.2f} {'better' if apart > 0 else 'worse'} than {first['model']}"
-    return (
-        f"{who} reaches a precision of {other['precision']:.2f} at a recall of "
-        f"{other['recall']:.2f} over {_decision(other)}; with an F0.5 of {other['f05']:.2f} it is "
-        f"{beside}.{_alike(material, other, first)}"
-    )
-
-
-def _decision(row: Mapping[Any, Any]) -> str:
-    """Which voxels were counted."""
+def _counted(row: Mapping[Any, Any]) -> str:
+    """Which voxels of a model count as detected."""
     if row["voxels"] == WHOLE_TOWERS:
-        return "the voxels of the whole towers it finds"
-    return "the voxels that reach its tau"
+        return "the voxels of whole towers"
+    return "the voxels at or above tau"
 
 
-def _alike(material: Material, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
-    """The same two models with the same voxels counted, where theirs are not."""
-    frame = material.table("whole_towers")
-    if other["voxels"] == first["voxels"] or frame is None:
-        return ""
-    f05 = frame.set_index("model")
-    said = [
-        f"{f05.loc[other['model'], f'{part}_f05']:.2f} against "
-        f"{f05.loc[first['model'], f'{part}_f05']:.2f} {of}"
-        for part, of in (("towers", "of whole towers"), ("tau", "of voxels that reach tau"))
-    ]
-    return f" Counted alike, mean over all seeds, it has {' and '.join(said)}."
+def _seeds(row: Mapping[Any, Any]) -> str:
+    """Which trainings a row is of: ``all seeds``, or ``seed 3, best on validation``."""
+    counted = str(row["counted"])
+    return f"the mean of {counted}" if counted == "all seeds" else counted
 
 
-def _speaking(models: pd.DataFrame, name: str) -> Mapping[Any, Any]:
-    """The row that speaks for a model: its seed that predicts, else all seeds."""
+def _representative(models: pd.DataFrame, name: str) -> Mapping[Any, Any]:
+    """The row of a model: its seed that is best on validation, or else the mean of all seeds."""
     rows = models[models["model"] == name]
     best = rows[rows["counted"].str.contains("best on validation", na=False)]
     return (best if len(best) else rows).iloc[0].to_dict()
 
 
-def _what(material: Material, row: Mapping[Any, Any]) -> str:
-    """What kind of model it is, with the number of its parameters."""
+def _kind(context: ReportContext, row: Mapping[Any, Any]) -> str:
+    """The architecture and how it was trained, with the number of parameters."""
     size = row["parameters"]
-    numbers = "" if size != size else f" of {write(size, 'count')} numbers"
+    numbers = "" if size != size else f" with {write(size, 'count')} parameters"
     name = row["model"]
     if name == BOOSTED_TREES:
-        return f"boosted trees{numbers}"
-    if material.results.models[name] == "cnn":
-        return f"free kernels{numbers}"
-    trained = material.results.of_model(name)[0]
+        return f"gradient boosted decision trees{numbers}"
+    if context.results.models[name] == "cnn":
+        return f"a convolutional network{numbers}"
+    trained = context.results.of_model(name)[0]
     protocol = ((trained.provenance or {}).get("settings") or {}).get("protocol", "thesis")
-    in_metres = protocol == "operational"
-    how = "with kernels in metres, searched for" if in_metres else "trained by the thesis' protocol"
+    operational = protocol == "operational"
+    how = "in metres, for practical use" if operational else "trained as in the thesis"
     return f"a SCENE-Net{numbers} {how}"

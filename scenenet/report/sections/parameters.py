@@ -1,34 +1,36 @@
-"""The sections on what is inside of a model: its numbers, what they promise (thesis 5.2.2, 3.4)."""
+"""The sections on the inside of a model: parameters and verified properties (thesis 5.2.2, 3.4)."""
 
 from __future__ import annotations
 
 from scenenet.report.blocks import Block, Column, Facts, Heading, Section, Text, table
-from scenenet.report.context import Material
+from scenenet.report.context import ReportContext
 
 
-def learned(material: Material) -> Section | None:
+def learned(context: ReportContext) -> Section | None:
     """Figures 4.2-4.4 and 5.5."""
-    blocks: list[Block] = [*_numbers(material), *material.figures("learned")]
-    return Section("learned", "What was learned", blocks) if blocks else None
+    blocks: list[Block] = [*_numbers(context), *context.figures("learned")]
+    return Section("learned", "Learned parameters", blocks) if blocks else None
 
 
-def _numbers(material: Material) -> list[Block]:
-    """A table a model with every number in metres, and a sentence for each."""
-    frame = material.table("parameters")
+def _numbers(context: ReportContext) -> list[Block]:
+    """A table per model with every parameter in metres and a sentence for each."""
+    frame = context.table("parameters")
     if frame is None:
         return []
     blocks: list[Block] = []
-    share = material.thesis.value("parameters.lambda_negative_sphere")
+    share = context.thesis.value("parameters.lambda_negative_sphere")
     ours = frame[frame["parameter"] == "lambda.negative_sphere"]
     if share is not None and len(ours):
-        facts = [("λ of the negative sphere, thesis", f"{share:g} %")]
-        facts += [(f"{row.model}", f"{100 * row.mean:.1f} %") for row in ours.itertuples()]
+        facts = [("mixing weight of the negative sphere, thesis", f"{share:g} %")]
+        facts += [
+            (f"the same, {row.model}", f"{100 * row.mean:.1f} %") for row in ours.itertuples()
+        ]
         blocks += [
             Facts(facts),
             Text(
-                "In the thesis' model the negative sphere has the largest mixing weight (5.2.2). "
-                "Weights of different runs are comparable only as far as the kernels have values "
-                "of the same size."
+                "In the model of the thesis, the negative sphere has the largest mixing weight "
+                "(5.2.2). The weights of two runs can be compared only if the values of their "
+                "kernels are of similar size."
             ),
         ]
     columns = [
@@ -36,9 +38,9 @@ def _numbers(material: Material) -> list[Block]:
         Column("symbol", "symbol"),
         Column("mean", "trained", "number", "std"),
         Column("unit", "unit"),
-        Column("initial", "at the start", "number"),
+        Column("initial", "initial", "number"),
         Column("thesis", "thesis", "number", published=True),
-        Column("sentence", "what it says", "sentence"),
+        Column("sentence", "meaning", "sentence"),
     ]
     shown = frame.assign(
         parameter=frame["parameter"].str.replace("_", " ").str.replace(".", ": "),
@@ -47,63 +49,65 @@ def _numbers(material: Material) -> list[Block]:
     for model, rows in shown.groupby("model", sort=False):
         seeds = int(rows["n_seeds"].iloc[0])
         began = rows["initial_from"].iloc[0]
-        start = f" “At the start” is the mean of the numbers {began}." if began == began else ""
+        start = f" “Initial” is the mean of the values {began}." if began == began else ""
         caption = (
-            f"The numbers of {model}, mean ± standard deviation over {seeds} seeds, lengths in "
-            "metres. The sentences follow from the kernels' formulas (thesis 4.4) and read the "
-            f"mean.{start}"
+            f"Parameters of {model}, mean ± standard deviation over {seeds} seeds, lengths in "
+            "metres. The sentences are derived from the formulas of the kernels (thesis 4.4) with "
+            f"the mean values.{start}"
         )
         blocks.append(table(rows, columns, caption, "tables/parameters.csv"))
     return blocks
 
 
-def certificate(material: Material) -> Section | None:
-    """What each model that predicts keeps of the promises of a GENEO (thesis 3.4, 4.3)."""
-    frame = material.table("certificate")
+def certificate(context: ReportContext) -> Section | None:
+    """Which properties of a GENEO each model has (thesis 3.4, 4.3)."""
+    frame = context.table("certificate")
     if frame is None:
         return None
     blocks: list[Block] = [
         Text(
             "A GENEO is equivariant (thesis Eq. 3.1) and non-expansive (Eq. 3.2), and a convex "
-            "combination of GENEOs is one. These are statements about functions on space; a model "
-            "works with kernels cut to a box of voxels. Here each is worked out and measured for "
-            "the models as they predict."
+            "combination of GENEOs is a GENEO. These are statements about functions on continuous "
+            "space, while a model uses kernels that are cut to a box of voxels. This section "
+            "verifies each property by calculation and by measurement for the models as they are "
+            "used."
         )
     ]
     columns = [
         Column("property", "property", "sentence"),
         Column("holds", "holds", "yes"),
-        Column("found", "how far", "sentence"),
+        Column("found", "result", "sentence"),
         Column("thesis", "thesis"),
     ]
     for model, rows in frame.groupby("model", sort=False):
-        scene = (material.results.certificate(str(model)) or {}).get("scene", "a synthetic scene")
+        scene = (context.results.certificate(str(model)) or {}).get("scene", "a synthetic scene")
         if rows["kind"].iloc[0] == "cnn":
-            said = (
-                f"{model} is a convolution, which moves with the scene by construction. Its "
-                "kernels are free numbers, so nothing else is promised."
+            basis = (
+                f"{model} is a convolution, so it is equivariant under translation by "
+                f"construction. Its kernels are unconstrained, so no other property is guaranteed."
             )
         else:
-            said = f"Measured on {scene}, at the voxel size the model predicts with."
-        caption = f"{model}, seed {rows['seed'].iloc[0]:.0f}. {said}"
+            basis = f"Measured on {scene}, at the voxel size that the model uses."
+        caption = f"{model}, seed {rows['seed'].iloc[0]:.0f}. {basis}"
         blocks += [
             Heading(f"{model}: {rows['holds'].sum()} of {len(rows)} properties hold"),
             table(rows, columns, caption, "tables/certificate.csv"),
         ]
-    moved = material.table("certificate_turns")
+    moved = context.table("certificate_turns")
     if moved is not None:
         columns = [
             Column("model", "model"),
-            Column("degrees", "turned [°]", "number"),
-            Column("mean_h", "H moves by", "score"),
-            Column("mean_m", "M moves by", "score"),
-            Column("largest_m", "M at most", "score"),
-            Column("decided_otherwise", "decided otherwise", "score"),
+            Column("degrees", "rotation [°]", "number"),
+            Column("mean_h", "mean change of H", "score"),
+            Column("mean_m", "mean change of M", "score"),
+            Column("largest_m", "largest change of M", "score"),
+            Column("decided_otherwise", "share of detections that differ", "score"),
         ]
         caption = (
-            "The scene turned about z, and in the row without an angle shifted by half a voxel: "
-            "mean difference of the observer H in its standard deviations, of the probability M, "
-            "and the share of detections that are there either way but not both."
+            "Change of the output when the scene is rotated about z or, in the row without an "
+            "angle, shifted by half a voxel: mean difference of the observer H in its standard "
+            "deviations, of the probability M, and the share of detections that are present in one "
+            "of the two scenes only."
         )
         blocks.append(table(moved, columns, caption, "tables/certificate_turns.csv", folded=True))
-    return Section("certificate", "What is certain about it", blocks)
+    return Section("certificate", "Verified properties", blocks)

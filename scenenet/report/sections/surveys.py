@@ -1,4 +1,4 @@
-"""The sections on classified surveys, and on what everything was made from."""
+"""The sections on the classified surveys and on provenance."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import sys
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
+
+import pandas as pd
 
 from scenenet.core.files import digest
 from scenenet.report.blocks import (
@@ -20,10 +22,10 @@ from scenenet.report.blocks import (
     table,
     write,
 )
-from scenenet.report.context import Material
+from scenenet.report.context import ReportContext
 
 TOWERS_LISTED = 300
-"""A longer list is no longer read on a page; the GeoJSON has all of them."""
+"""Longest list of towers on the page; the GeoJSON file has all towers."""
 
 LIBRARIES = (
     "scenenet",
@@ -48,11 +50,11 @@ SUMMARY_FACTS: tuple[tuple[str, str, Format], ...] = (
 )
 
 
-def predictions(material: Material) -> Section | None:
+def predictions(context: ReportContext) -> Section | None:
     """Every classified survey with its towers."""
     blocks: list[Block] = []
-    for survey in material.results.predicted:
-        found = material.results.prediction(survey)
+    for survey in context.results.predicted:
+        found = context.results.prediction(survey)
         if found is None:
             continue
         summary, geojson = found
@@ -62,21 +64,19 @@ def predictions(material: Material) -> Section | None:
             if summary.get(name) is not None
         ]
         blocks += [Heading(survey), Facts(facts)]
-        blocks += material.figures_of(survey, "predictions")
+        blocks += context.figures_of(survey, "predictions")
         blocks.append(_tower_list(survey, geojson))
     if not blocks:
         return None
-    said = Text(
-        "Surveys classified by the model, with the towers it found. Nobody has confirmed them: a "
-        "tower near the edge of the data or with a low probability deserves a second look. "
-        "Positions are in the CRS of the survey; the GeoJSON files open in any GIS."
+    note = Text(
+        "Surveys classified by the model, with the towers it found. The towers have not been "
+        "confirmed: review those near the edge of the data or with a low probability. Positions "
+        "are in the CRS of the survey; the GeoJSON files open in any GIS."
     )
-    return Section("predictions", "Classified surveys", [said, *blocks])
+    return Section("predictions", "Classified surveys", [note, *blocks])
 
 
 def _tower_list(survey: str, geojson: Mapping[str, Any]) -> Block:
-    import pandas as pd
-
     features = geojson["features"]
     if not features:
         return Text(f"No tower was found in {survey}.")
@@ -95,10 +95,10 @@ def _tower_list(survey: str, geojson: Mapping[str, Any]) -> Block:
         Column("height", "height [m]", "metres"),
         Column("base_elevation", "base elevation [m]", "metres"),
         Column("width", "width [m]", "metres"),
-        Column("wire_directions", "directions of wires", "count"),
+        Column("wire_directions", "conductor directions", "count"),
         Column("probability", "probability", "score"),
         Column("points", "points", "count"),
-        Column("edge_distance", "from the edge of the data [m]", "metres"),
+        Column("edge_distance", "distance from the edge of the data [m]", "metres"),
     ]
     shares = [
         Column(name, f"{name.removeprefix('share.').replace('_', ' ')} [%]", "share")
@@ -109,17 +109,16 @@ def _tower_list(survey: str, geojson: Mapping[str, Any]) -> Block:
     more = f" The first {TOWERS_LISTED} of {len(features)}." if len(features) > len(rows) else ""
     caption = (
         f"Towers found in {survey}."
-        + (" The last columns say what each GENEO added to the answer (above 0) or took from it "
-           "(below 0)." if shares else "")
+        + (" The last columns are the contributions of each GENEO: positive raises the "
+        "probability, "
+           "negative lowers it." if shares else "")
         + more
     )  # fmt: skip
     return table(frame, columns, caption, f"predict/{survey}/{survey}.towers.geojson")
 
 
-def provenance(material: Material) -> Section | None:
-    """Hashes and versions, for those who have to make it again."""
-    import pandas as pd
-
+def provenance(context: ReportContext) -> Section | None:
+    """Fingerprints and versions, to reproduce the run."""
     rows = [
         {
             "result": path,
@@ -130,13 +129,13 @@ def provenance(material: Material) -> Section | None:
             "inputs": digest(made_by.get("inputs", {})),
             "version": made_by.get("version"),
         }
-        for path, made_by in material.results.provenances()
+        for path, made_by in context.results.provenances()
     ]
     blocks: list[Block] = [
         Text(
             "Each result folder has a provenance.json with the settings, the fingerprint of every "
-            "input and the hash of the code that made it. The table lists them; “inputs” is a "
-            "digest of all fingerprints."
+            "input, and the hash of the code that produced it. The table lists them; “inputs” is a "
+            "digest of all input fingerprints."
         ),
         Facts([("Python", sys.version.split()[0]), *_versions()]),
     ]
@@ -150,9 +149,9 @@ def provenance(material: Material) -> Section | None:
             Column("inputs", "inputs"),
             Column("version", "version"),
         ]
-        blocks.append(table(pd.DataFrame(rows), columns, "What made each result.", folded=True))
-    blocks.append(_published(material))
-    return Section("provenance", "Where everything is from", blocks)
+        blocks.append(table(pd.DataFrame(rows), columns, "Provenance of each result.", folded=True))
+    blocks.append(_published(context))
+    return Section("provenance", "Provenance", blocks)
 
 
 def _versions() -> list[tuple[str, str]]:
@@ -165,17 +164,17 @@ def _versions() -> list[tuple[str, str]]:
     return found
 
 
-def _published(material: Material) -> Table:
-    """Every published number, so that a reader can check what ours were put beside."""
+def _published(context: ReportContext) -> Table:
+    """Every published number that this report uses."""
     columns = [
         Column("name", "number"),
-        Column("what", "what it is"),
+        Column("what", "meaning"),
         Column("value", "value", "plain", published=True),
         Column("unit", "unit"),
         Column("place", "place in the thesis"),
     ]
     rows = []
-    for name, number in material.thesis.numbers.items():
+    for name, number in context.thesis.numbers.items():
         bounds = [write(bound, "plain") for bound in (number.low, number.high)]
         value = write(number.value, "plain")
         value += "" if number.spread is None else f" ± {number.spread:g}"
@@ -183,5 +182,5 @@ def _published(material: Material) -> Table:
             value += f" ({bounds[0]} to {bounds[1]})"
         rows.append([name, number.what or "", value, number.unit or "", number.place])
     return Table(
-        f"Published numbers: {material.thesis.source}.", columns, rows, "config/thesis.yaml", True
+        f"Published numbers: {context.thesis.source}.", columns, rows, "config/thesis.yaml", True
     )

@@ -14,12 +14,12 @@ from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
 from scenenet.experiments.cross_validation.run import (
     COLUMNS,
-    WHOLE_TOWERS,
     cross_validate,
     run_folds,
 )
 from scenenet.experiments.cross_validation.summary import summarise_folds
 from scenenet.experiments.train_and_tune import train_and_tune
+from scenenet.metrics.score_columns import AT_TAU, WHOLE_TOWERS
 from scenenet.synthetic import SyntheticSettings, make_survey
 
 DETECTION = DetectionSettings()
@@ -45,8 +45,10 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     thesis = models[1]
     both = cross_validate([manifest], thesis, (0, 1), 2, 0.0, DETECTION, tmp_path / "runs.csv")
     assert tuple(pd.read_csv(tmp_path / "runs.csv").columns) == COLUMNS == tuple(both.columns)
-    of_towers = both["model"] == thesis.name + WHOLE_TOWERS
+    of_towers = both["voxels"] == WHOLE_TOWERS
     table, whole = both[~of_towers], both[of_towers]
+    assert set(both["model"]) == {thesis.name}
+    assert set(table["voxels"]) == {AT_TAU}
     dataset = load([manifest])
     names = sorted(sample.id for sample in dataset.samples)
     assert list(table["seed"]) == [0, 0, 0, 1, 1, 1]
@@ -54,17 +56,17 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     assert set(table["training_crops"]) == {4}
     by_id = {sample.id: sample for sample in dataset.samples}
     training, out = [by_id[n] for n in names[:2] + names[4:]], [by_id[n] for n in names[2:4]]
-    rival = train_and_tune(thesis, training, [], 1)
+    tuned = train_and_tune(thesis, training, [], 1)
     row = table[(table["seed"] == 1) & (table["fold"] == 2)].iloc[0]
-    counts = rival.score(out)
-    assert (row["tau"], row["f05"], row["tp"]) == (rival.tau, counts.f05, counts.tp)
+    counts = tuned.score(out)
+    assert (row["tau"], row["f05"], row["tp"]) == (tuned.tau, counts.f05, counts.tp)
     assert row["tp"] + row["fn"] == sum(int(sample.tower.sum()) for sample in out)
     row = whole[(whole["seed"] == 1) & (whole["fold"] == 2)].iloc[0]
-    counts = rival.score_towers(out, DETECTION)
-    assert (row["tau"], row["f05"], row["tp"]) == (rival.tau, counts.f05, counts.tp)
+    counts = tuned.score_towers(out, DETECTION)
+    assert (row["tau"], row["f05"], row["tp"]) == (tuned.tau, counts.f05, counts.tp)
 
 
-def test_the_boosted_trees_takes_part(manifest):
+def test_the_boosted_trees_take_part(manifest):
     (row, *_) = run_folds(load([manifest]), None, (0,), 3, 0.0, DETECTION)
     assert row["model"] == "boosted trees"
     assert row["training_crops"] == 3

@@ -1,4 +1,4 @@
-"""Synthetic beside real: the comparison itself, and where real crops are at hand its outcome."""
+"""The comparison of synthetic with real crops, and its result if real crops are available."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import pytest
 
 from scenenet.core.errors import InputError
 from scenenet.experiments.domain_gap.compare_crops import (
-    beside,
+    compare_properties,
+    crop_separability,
     markdown,
     measure,
     real_crops,
     synthetic_crops,
-    tell_apart,
-    tell_voxels_apart,
+    voxel_separability,
 )
 from scenenet.synthetic import SyntheticSettings
 
@@ -31,28 +31,28 @@ def measured():
     return [measure(synthetic_crops(SyntheticSettings(**SPARSE, **kind))) for kind in kinds]
 
 
-def test_crops_come_through_the_chain(measured):
+def test_crops_are_made_by_the_stages_of_a_survey(measured):
     for some in measured:
         assert len(some.properties) == len(some.grids) == SPARSE["towers"]
         assert len(some.voxels) == len(some.crop)
         assert np.isfinite(some.voxels).all()
 
 
-def test_what_is_alike_cannot_be_told_apart_and_what_differs_can(measured):
-    first, alike, bare = measured
-    voxels, _ = tell_voxels_apart(first, alike)
+def test_similar_crops_are_not_separable_and_different_ones_are(measured):
+    first, similar, bare = measured
+    voxels, _ = voxel_separability(first, similar)
     assert voxels.auc < 0.7
-    voxels, crops = tell_voxels_apart(first, bare)
+    voxels, crops = voxel_separability(first, bare)
     assert voxels.auc > 0.6
     assert crops.auc > 0.8
-    test = tell_apart(first.properties, bare.properties)
+    test = crop_separability(first.properties, bare.properties)
     assert test.auc > 0.7
     assert {"canopy_cover", "tall_density", "class_12"} & set(test.features.index[:8])
 
 
 def test_the_table_says_what_is_in_range(measured):
     first, _, bare = measured
-    table = beside(first.properties, bare.properties).set_index("property")
+    table = compare_properties(first.properties, bare.properties).set_index("property")
     assert table.loc["tower_height", "within"]
     assert not table.loc["tall_density", "within"]
     text = markdown(table.reset_index(), {}, (8, 8))
@@ -60,17 +60,17 @@ def test_the_table_says_what_is_in_range(measured):
     assert "**no**" in text
 
 
-def test_what_holds_no_samples_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no TS40K sample"):
+def test_a_folder_without_samples_is_refused(tmp_path):
+    with pytest.raises(InputError, match="no TS40K samples"):
         next(real_crops(tmp_path))
-    with pytest.raises(InputError, match="no TS40K sample"):
+    with pytest.raises(InputError, match="no TS40K samples"):
         next(real_crops(tmp_path / "survey.laz"))
 
 
-@pytest.mark.parametrize("module", ["realism", "transfer"])
-def test_the_command_says_what_it_does(module):
+@pytest.mark.parametrize("module", ["compare_crops", "transfer"])
+def test_the_command_has_a_help_text(module):
     shown = subprocess.run(
-        [sys.executable, "-m", f"scenenet.{module}", "--help"],
+        [sys.executable, "-m", f"scenenet.experiments.domain_gap.{module}", "--help"],
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert "--real" in shown.stdout
@@ -79,17 +79,17 @@ def test_the_command_says_what_it_does(module):
 def test_default_corridors_are_like_the_public_crops(real_data):
     real = measure(real_crops(real_data / "ts40k"))
     synthetic = measure(synthetic_crops(SyntheticSettings(towers=24, seed=5)))
-    table = beside(real.properties, synthetic.properties)
+    table = compare_properties(real.properties, synthetic.properties)
     outside = table.loc[~table["within"], "property"].tolist()
     assert len(outside) <= 4, outside
-    voxels, _ = tell_voxels_apart(real, synthetic)
+    voxels, _ = voxel_separability(real, synthetic)
     assert voxels.auc < 0.7
 
 
-def test_one_number_tells_apart_what_lies_apart():
+def test_one_differing_property_is_enough_to_separate():
     left = pd.DataFrame({"a": np.arange(10.0), "b": np.ones(10)})
     right = pd.DataFrame({"a": 100 + np.arange(30.0), "b": np.ones(30)})
-    test = tell_apart(left, right)
+    test = crop_separability(left, right)
     assert test.auc > 0.99
     assert test.features["a"] == 1.0
     assert test.features["b"] == 0.5

@@ -1,4 +1,4 @@
-"""Labels are wrong to the share that was asked for, and nothing else differs."""
+"""The share of wrong labels is the requested one, and nothing else differs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_a_stretch_at_many_strengths_is_each_corridors_own(line):
         np.testing.assert_array_equal(made.truth, alone.truth)
 
 
-def test_the_share_of_wrong_labels_is_what_was_asked_for(line):
+def test_the_share_of_wrong_labels_is_the_requested_one(line):
     levels = (0, 0.2, 0.4, 0.6)
     lines = noisy_lines(line, levels, GRID)
     assert [made.level for made in lines] == list(levels)
@@ -56,6 +56,6 @@ def test_voxels_are_the_same_and_labels_are_not(line):
         assert true.tower.any()
 
 
-def test_more_wrong_labels_than_there_can_be_are_refused(line):
-    with pytest.raises(InputError, match=r"no annotation .* 97%"):
+def test_an_unreachable_share_of_wrong_labels_is_refused(line):
+    with pytest.raises(InputError, match=r"no annotation noise .* 97%"):
         noisy_lines(line, (0, 0.97), GRID)

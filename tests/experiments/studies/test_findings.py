@@ -1,4 +1,4 @@
-"""What a study came to is said by rule, and not more than the numbers say."""
+"""The findings of a study follow from its numbers by rule."""
 
 from __future__ import annotations
 
@@ -15,48 +15,49 @@ def study(n_seeds: int = 4) -> StudySettings:
 
 
 def summary(rows: dict[str, tuple], n_seeds: int = 4) -> pd.DataFrame:
-    """Of variant -> (F0.5, its deviation, alive, share of seeds with a negative number)."""
+    """From variant -> (F0.5, its deviation, live models, share of seeds with a negative
+    parameter)."""
     names = ["f05", "f05_std", "alive", "negative_share"]
     frame = pd.DataFrame(rows.values(), columns=names)
     return frame.assign(variant=list(rows), n_seeds=n_seeds)
 
 
-def test_best_and_lowest_and_what_is_as_good():
+def test_best_lowest_and_equal_variants():
     # The error of a difference is sqrt(0.04^2 / 4 + 0.04^2 / 4) = 0.028: 0.45 is within two.
     frame = summary(
         {"a": (0.40, 0.04, 4, 0), "b": (0.50, 0.04, 4, 0), "c": (0.45, 0.04, 4, 0)}
     )  # fmt: skip
     assert list(as_good_as_best(frame)) == [False, True, True]
     assert findings(study(), frame) == (
-        "Best here: b with an F0.5 of 0.50 ± 0.04. Lowest: a with an F0.5 of 0.40 ± 0.04. "
-        "As good as the best within 2 standard errors: c."
+        "Best: b with F0.5 0.50 ± 0.04. Lowest: a with F0.5 0.40 ± 0.04. "
+        "Equal to the best within 2 standard errors: c."
     )
 
 
 def test_one_seed_tells_nothing_of_spread():
     frame = summary({"a": (0.4, float("nan"), 1, 0), "b": (0.5, float("nan"), 1, 0)}, 1)
-    said = findings(study(1), frame)
-    assert "b with an F0.5 of 0.50. Lowest" in said
-    assert "One seed" in said
-    assert "standard error" not in said
+    text = findings(study(1), frame)
+    assert "b with F0.5 0.50. Lowest" in text
+    assert "one seed" in text
+    assert "standard error" not in text
 
 
-def test_the_dead_are_named_with_how_many_they_are():
+def test_variants_with_dead_models_are_named_with_their_number():
     frame = summary({"a": (0.4, 0.0, 4, 0), "b": (0.1, 0.0, 1, 0)})
-    assert "Dead after training: b (3 of 4)." in findings(study(), frame)
+    assert "Dead models: b (3 of 4)." in findings(study(), frame)
     many = {f"v{i}": (0.1, 0.0, 0, 0) for i in range(9)} | {"good": (0.4, 0.0, 4, 0)}
-    assert "Dead after training: 9 of 10." in findings(study(), summary(many))
+    assert "Dead models: 9 of 10." in findings(study(), summary(many))
 
 
 def test_nothing_found_is_not_a_best():
     frame = summary({"a": (0.0, 0.0, 0, 0), "b": (0.0, 0.0, 0, 0)})
-    assert findings(study(), frame) == "None of them finds a tower voxel."
+    assert findings(study(), frame) == "No variant detects a tower voxel."
 
 
-def test_negative_numbers_are_told_where_variants_differ_in_them():
-    told = findings(study(), summary({"a": (0.4, 0.1, 4, 0.25), "b": (0.4, 0.1, 4, 0.75)}))
-    assert "A number below zero is left by: a 1 of 4 seeds, b 3 of 4 seeds." in told
+def test_negative_parameters_are_reported_if_the_variants_differ_in_them():
+    text = findings(study(), summary({"a": (0.4, 0.1, 4, 0.25), "b": (0.4, 0.1, 4, 0.75)}))
+    assert "Ends with a negative parameter: a (1 of 4 seeds), b (3 of 4 seeds)." in text
     same = findings(study(), summary({"a": (0.4, 0.1, 4, 0.5), "b": (0.4, 0.1, 4, 0.5)}))
-    assert "below zero" not in same
+    assert "negative" not in same
     cnn = findings(study(), summary({"a": (0.4, 0.1, 4, 0.5), "b": (0.4, 0.1, 4, float("nan"))}))
-    assert "below zero" not in cnn
+    assert "negative" not in cnn

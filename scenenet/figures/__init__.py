@@ -1,6 +1,6 @@
-"""The pictures of thesis chapters 4 and 5.
+"""The figures of thesis chapters 4 and 5.
 
-``charts`` and ``scenes`` draw plain data; ``plan`` says what a result folder gets.
+``plots`` draws plain data; ``catalogue`` lists the figures of a result folder.
 """
 
 from scenenet.figures.catalogue import CROP_RANKS, Drawing, Picture, draw_all, plan, read_pictures

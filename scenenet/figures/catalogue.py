@@ -1,6 +1,6 @@
-"""Which pictures a result folder gets, and the list of them that the report reads.
+"""The list of figures of a result folder.
 
-The plan follows from the configuration alone, so a workflow can name every picture before it is
+The list follows from the configuration alone, so that the workflow knows every figure before it is
 drawn.
 """
 
@@ -29,16 +29,16 @@ Source = tuple[str, str]
 
 @dataclass(frozen=True)
 class Picture:
-    """One figure with what a reader needs to understand it.
+    """A figure with its texts.
 
     Attributes:
         file: the PNG.
         title: a few words.
-        alt: what is seen, for those who cannot see it.
-        caption: what it shows and on what data.
-        section: part of the report it belongs to.
-        models: the models it shows, if it shows any.
-        survey: the survey it shows, if it shows one alone.
+        alt: description for readers who cannot see it.
+        caption: what the figure shows and for which data.
+        section: section of the report.
+        models: the models that it shows.
+        survey: the survey that it shows, if it is only one.
     """
 
     file: Path
@@ -56,7 +56,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A picture to be: what is known of it beforehand, and how to draw it.
+    """A figure before it is drawn: its title and section, and how to draw it.
 
     ``draw`` takes the PNG to write and returns (alternative text, caption).
     """
@@ -72,13 +72,13 @@ class Drawing:
 def plan(
     results: Results, thesis: Thesis | None = None, sources: Mapping[str, Source] | None = None
 ) -> list[Drawing]:
-    """The pictures of a result folder, in the order of the report. Reads nothing.
+    """The figures of a result folder, in the order of the report. Reads no file.
 
     Args:
-        results: the result folder; its files need not be there yet.
-        thesis: published numbers to mark where a picture has a place for them.
-        sources: survey -> where its labelled points are, for the map of its towers. Folders of
-            single crops have no map and are passed over.
+        results: the result folder; its files need not exist yet.
+        thesis: published numbers, which some figures show.
+        sources: survey -> file and codes of its labelled points, for the map of its towers. Folders
+            of single crops have no map and are skipped.
     """
     planned: list[Drawing] = []
     for survey, (path, codes) in (sources or {}).items():
@@ -87,32 +87,34 @@ def plan(
             labels = _bind(dataset_figures.draw_labels, survey, path, codes)
             title = f"{survey}, coloured by its labels"
             planned.append(Drawing(f"labels-{survey}", title, "data", labels, survey=survey))
-            title = f"Towers of {survey} told apart"
+            title = f"Clusters of tower points in {survey}"
             planned.append(Drawing(f"clusters-{survey}", title, "towers", draw, survey=survey))
     if results.surveys:
         draw = _bind(dataset_figures.draw_surveys, results)
-        planned.append(Drawing("surveys", "A crop of each survey, at one scale", "data", draw))
+        planned.append(Drawing("surveys", "Crops of each survey at the same scale", "data", draw))
     models = tuple(results.models)
     reference = results.predicting
     if reference is not None:
         draw = _bind(dataset_figures.draw_grids, results, reference)
         planned.append(Drawing("voxels", "One crop on three grids", "voxels", draw))
         draw = _bind(model_figures.draw_curves, results, thesis)
-        title = "Precision against recall"
+        title = "Precision and recall"
         planned.append(Drawing("precision-recall", title, "models", draw, models))
     for model, kind in results.models.items():
         shown = (model,)
         draw = _bind(model_figures.draw_training, results, model)
-        planned.append(Drawing(f"training-{model}", f"Training {model}", "training", draw, shown))
+        planned.append(
+            Drawing(f"training-{model}", f"Training of {model}", "training", draw, shown)
+        )
         draw = _bind(model_figures.draw_kernels, results, model)
-        title = f"The kernels of {model}"
+        title = f"Kernels of {model}"
         planned.append(Drawing(f"kernels-{model}", title, "learned", draw, shown))
         if kind == "scenenet":
             draw = _bind(model_figures.draw_parameters, results, model, thesis)
-            title = f"What {model} has learned"
+            title = f"Learned parameters of {model}"
             planned.append(Drawing(f"parameters-{model}", title, "learned", draw, shown))
             draw = _bind(model_figures.draw_paths, results, model)
-            title = f"How each parameter of {model} moved"
+            title = f"Parameters of {model} during training"
             planned.append(Drawing(f"paths-{model}", title, "training", draw, shown))
     if reference is not None:
         for rank in CROP_RANKS:
@@ -120,12 +122,14 @@ def plan(
             title = f"The {rank} test crop"
             planned.append(Drawing(f"crop-{rank}", title, "crops", draw, models))
         draw = _bind(crop_figures.draw_resolutions, results, reference)
-        title = "One crop on two grids, answered by one model"
+        title = "One model on two grids"
         planned.append(Drawing("resolutions", title, "crops", draw, (reference,)))
     for survey in results.predicted:
         draw = _bind(crop_figures.draw_prediction, results, survey)
         name = f"prediction-{survey}"
-        planned.append(Drawing(name, f"{survey} classified", "predictions", draw, survey=survey))
+        planned.append(
+            Drawing(name, f"Classification of {survey}", "predictions", draw, survey=survey)
+        )
     for study in results.studies:
         draw = _bind(model_figures.draw_study, results, study, thesis)
         planned.append(Drawing(f"study-{study.name}", study.title, "studies", draw))
@@ -136,7 +140,7 @@ def plan(
 
 
 def draw_all(planned: Iterable[Drawing], out: str | Path) -> list[Picture]:
-    """Draw each into ``out/NAME.png`` with what is said about it in ``out/NAME.json``."""
+    """Draw each figure as ``out/NAME.png``, with its texts in ``out/NAME.json``."""
     from scenenet.core.progress import track
 
     pictures = []
@@ -152,21 +156,21 @@ def draw_all(planned: Iterable[Drawing], out: str | Path) -> list[Picture]:
 
 
 def read_pictures(folder: str | Path, names: Iterable[str]) -> list[Picture]:
-    """The pictures called ``names`` that have been drawn into ``folder``, in that order.
+    """The figures called ``names`` that exist in ``folder``, in that order.
 
     Raises:
-        InputError: a picture is gone while what is said about it is there.
+        InputError: the texts of a figure exist and its picture does not.
     """
     pictures = []
     for name in names:
-        said = Path(folder) / f"{name}.json"
-        if not said.exists():
+        texts = Path(folder) / f"{name}.json"
+        if not texts.exists():
             continue
-        entry = read_json(said)
+        entry = read_json(texts)
         file = Path(folder) / entry["file"]
         if not file.is_file():
             raise InputError(
-                "the picture is missing", file=file, remedy=f"Delete {said} and run again"
+                "the picture is missing", file=file, remedy=f"Delete {texts} and run again"
             )
         pictures.append(Picture(**{**entry, "file": file, "models": tuple(entry["models"])}))
     return pictures

@@ -1,4 +1,4 @@
-"""Pictures of answers: single test crops and classified surveys (thesis Figures 5.8 and 5.9).
+"""Figures of predictions: single test crops and classified surveys (thesis Figures 5.8 and 5.9).
 
 Every function that draws writes one PNG and returns (alternative text, caption).
 """
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from scenenet.pointcloud import PointCloud
 
 FINER = (64, 128)
-"""Voxels an edge: the thesis' grid of training, and the one it is answered on after."""
+"""Voxels per edge: the training grid of the thesis, and the finer grid of its predictions."""
 
 
 def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[str, str]:
@@ -42,18 +42,18 @@ def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[s
     shown = [replace(view, values=view.values[keep]) for view in views]
     return side_views(cloud.xyz[keep], shown, out), (
         f"Crop {sample['id']}: the {rank} of {len(chosen_by.evaluation['per_sample'])} test crops "
-        f"by F0.5 of {reference} (here {sample['f05']:.2f}, precision {sample['precision']:.2f}, "
-        f"recall {sample['recall']:.2f}{_counted(chosen_by, sample)}). Points take the probability "
-        "of their voxel; each model is the seed that is best on validation. As thesis Figures 5.8 "
-        "and 5.9."
+        f"by F0.5 of {reference} (F0.5 {sample['f05']:.2f}, precision {sample['precision']:.2f}, "
+        f"recall {sample['recall']:.2f}{_counted(chosen_by, sample)}). Points have the probability "
+        "of their voxel; each model is its best seed on validation. Compare thesis Figures 5.8 and "
+        "5.9."
     )
 
 
 def _counted(result: SeedResult, sample: Mapping[str, Any]) -> str:
-    """What the scores of a sample count, where it is not what reaches tau."""
+    """Which voxels the scores of a sample count, unless those at or above tau."""
     if not result.evaluation["whole_towers"]:
         return ""
-    return f", whole towers; of the voxels that reach tau F0.5 is {sample['f05_observer']:.2f}"
+    return f"; whole towers. F0.5 of the voxels at or above tau: {sample['f05_observer']:.2f}"
 
 
 def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]:
@@ -61,7 +61,7 @@ def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]
 
     found = results.prediction(survey)
     if found is None:
-        raise InputError("was not predicted", file=results.folder / "predict" / survey)
+        raise InputError("the survey was not classified", file=results.folder / "predict" / survey)
     _, geojson = found
     towers = [
         (*feature["geometry"]["coordinates"][:2], feature["properties"]["base_elevation"])
@@ -71,13 +71,13 @@ def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]
     alt = survey_overview(xyz, probability, np.asarray(towers, float).reshape(-1, 3), out)
     return alt, (
         f"{survey} from above and from the side, along its main direction. Colour is the tower "
-        "probability of each point (every point that is likely a tower is drawn, the others are "
-        "thinned); red marks are the detected towers, numbered as in the list."
+        "probability of each point (all points with a probability of at least 0.5 are drawn, the "
+        "others are thinned). Red marks: detected towers, numbered as in the list."
     )
 
 
 def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]:
-    """The middle test crop at the grid of training and at one of twice its resolution."""
+    """The median test crop on the training grid and on a grid of twice its resolution."""
     from scenenet.dataset.voxels import VoxelGrid, voxelise
     from scenenet.figures.plots.grids import GridView, truth_and_answer
     from scenenet.metrics.voxel_scores import confusion
@@ -88,7 +88,7 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
     sample = ranked(champion, "median")
     cloud = crop_cloud(results, sample)
     trained, card = read_model(champion.model_files[0])
-    views, said = [], []
+    views, scores = [], []
     for resolution in FINER:
         voxels = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution), sample["id"])
         probability, truth = probabilities(trained, voxels, card.measurement)
@@ -97,22 +97,25 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         title = f"{resolution}³, voxels of {size:.2f} m"
         centres = voxels.grid.centres(voxels.index)
         views.append(GridView(title, centres, size, voxels.tower, probability[voxels.index]))
-        said.append(
-            f"at {resolution}³ precision {counts.precision:.2f} and recall {counts.recall:.2f}"
+        scores.append(
+            f"precision {counts.precision:.2f} and recall {counts.recall:.2f} at {resolution}³"
         )
-    trained_on = {"m": "in metres", "voxel": "in voxels, as many on both grids"}[trained.units]
+    trained_on = {
+        "m": "in metres",
+        "voxel": "in voxels, with the same number of voxels on both grids",
+    }[trained.units]
     return truth_and_answer(views, card.threshold(), out), (
-        f"Crop {sample['id']}, the middle one of the test crops by F0.5 of {model}, on two grids: "
-        f"what is labelled tower, what {model} (seed {champion.seed}) answers, and where that is "
-        "right at its tau: green is right, orange is no tower, pink was missed. It was trained "
-        f"on voxels of {card.voxel_size:.2f} m alone; its kernels are {trained_on}. At the same "
-        f"tau of {card.threshold():.3f} it has {' and '.join(said)} of the voxels that reach tau. "
-        "As thesis Figure 5.10."
+        f"Crop {sample['id']}, the median test crop by F0.5 of {model}, on two grids. From the "
+        f"left: voxels labelled tower; probability of {model} (seed {champion.seed}); voxels at "
+        f"or above tau (green: true positive, orange: false positive, pink: false negative). The "
+        f"model was trained on voxels of {card.voxel_size:.2f} m only; its kernels are "
+        f"{trained_on}. At the same tau of {card.threshold():.3f} it has {' and '.join(scores)}. "
+        f"Compare thesis Figure 5.10."
     )
 
 
 def _probability(cloud: PointCloud, champion: SeedResult) -> View:
-    """The answer of a model to a crop, on the grid it was trained on."""
+    """The probabilities of a model for a crop, on the grid of its training."""
     from scenenet.dataset.voxels import VoxelSettings, voxelise
     from scenenet.figures.plots.point_clouds import View
     from scenenet.models.model_file import read_model

@@ -1,4 +1,4 @@
-"""Pictures of what was learned from: towers, surveys, grids (thesis 5.1).
+"""Figures of the data: towers, surveys, grids (thesis 5.1).
 
 Every function that draws writes one PNG and returns (alternative text, caption).
 """
@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +21,6 @@ from scenenet.figures.selection import (
     voxel_classes,
 )
 from scenenet.results.folder import Results, read_result
-
-if TYPE_CHECKING:
-    pass
 
 GRID_RESOLUTIONS = (32, 64, 128)
 
@@ -42,9 +39,10 @@ def draw_clusters(
     keep = thinned(len(xyz))
     alt = clusters(xyz[keep, :2], labels[keep], out)
     return alt, (
-        f"Points labelled tower in {survey} from above, each DBSCAN cluster (eps {settings.eps:g} "
-        f"m, at least {settings.min_points} points) with a number of its own; crosses belong to "
-        "none. The line is turned to lie flat, and the axes differ in scale. As thesis Figure 5.2."
+        f"Points labelled tower in {survey} from above, with a number for each DBSCAN cluster (eps "
+        f"{settings.eps:g} m, at least {settings.min_points} points); crosses belong to no "
+        f"cluster. The line is rotated to the horizontal axis; the axes have different scales. "
+        f"Compare thesis Figure 5.2."
     )
 
 
@@ -59,7 +57,7 @@ def draw_labels(survey: str, path: str, codes: str, out: Path) -> tuple[str, str
     for chunk in iter_chunks(path, codes):
         groups = chunk.roles
         keep = np.isin(groups, ("tower", "conductor"))
-        # Every n-th of the others, counted over the survey and not over its chunks.
+        # Every n-th of the other points, counted over the whole survey and not per chunk.
         keep[(-start) % step :: step] = True
         start += len(groups)
         places.append(chunk.xyz[keep])
@@ -67,16 +65,17 @@ def draw_labels(survey: str, path: str, codes: str, out: Path) -> tuple[str, str
     xyz, found = np.concatenate(places), np.concatenate(names)
     kept = thinned(len(xyz), 3 * POINTS_PER_PICTURE)
     return labelled_survey(xyz[kept], found[kept], out), (
-        f"{survey} from above and from the side, along its main direction, coloured by its labels; "
-        "the points are thinned, those of towers and wires less than the others. As thesis Figure "
-        "5.1."
+        f"{survey} from above and from the side, along its main direction, coloured by its labels. "
+        "Points are thinned, those of towers and conductors less than the others. Compare thesis "
+        "Figure 5.1."
     )
 
 
 def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
-    """The crop with the median number of points of each survey; of recorded samples more."""
+    """The crop with the median number of points of each synthetic survey, three of recorded
+    ones."""
     from scenenet.dataset.zarr_store import StoreReader
-    from scenenet.figures.plots.surveys import crops_beside
+    from scenenet.figures.plots.surveys import compare_crops
     from scenenet.pointcloud import class_scheme
 
     shown = {}
@@ -95,10 +94,10 @@ def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
             shown[title] = (arrays["xyz"][keep], kinds)
     if not shown:
         raise InputError("no survey has a crop to show", file=results.folder)
-    return crops_beside(shown, out), (
-        "Crops from the side and from above, all at the same scale: of a synthetic survey the one "
-        "with the median number of points, of recorded ones three. Points are coloured by what "
-        "they were labelled. As thesis Figure 5.3."
+    return compare_crops(shown, out), (
+        "Crops from the side and from above, all at the same scale: for a synthetic survey the "
+        "crop with the median number of points, for a recorded survey three crops. Points are "
+        "coloured by their label. Compare thesis Figure 5.3."
     )
 
 
@@ -116,13 +115,14 @@ def draw_grids(results: Results, reference: str, out: Path) -> tuple[str, str]:
         names = voxel_classes(groups, voxels.grid.voxel_of(cloud.xyz), voxels.index)
         grids[f"{resolution}³, voxels of {voxels.grid.voxel_size:.2f} m"] = (zyx, names)
     return voxel_grids(grids, out), (
-        f"Occupied voxels of crop {sample['id']} at three resolutions, coloured by what they hold: "
-        "a tower, else a wire, vegetation, ground, or something else. As thesis Figure 5.4."
+        f"Occupied voxels of crop {sample['id']} at three resolutions, coloured by their "
+        "content: a voxel is drawn as tower if it contains any tower point, else as conductor, "
+        "vegetation, ground or other. Compare thesis Figure 5.4."
     )
 
 
 def _tower_settings(results: Results, survey: str) -> Mapping[str, Any]:
-    """What the towers of a survey were found with; the defaults where no record says."""
+    """The settings with which the towers of a survey were found; empty without a record."""
     path = results.folder / "towers" / survey / "provenance.json"
     if not path.exists():
         return {}

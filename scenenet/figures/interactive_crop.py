@@ -1,5 +1,7 @@
-"""A test crop as voxels that a page can turn: class, probability, contributions, and the counts at
-every threshold (thesis Figures 5.6, 5.8, 5.9)."""
+"""A test crop as voxels for the 3D view of the report (thesis Figures 5.6, 5.8, 5.9).
+
+The view shows class, probability, contributions, and the scores at every threshold.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
 
 CLASSES = tuple(reversed(tuple(ROLE_COLOURS)))
-"""What a voxel shows: the last of these that any of its points is."""
+"""Class of a voxel: the last of these that any of its points has."""
 
 
 def write_scene(
@@ -29,15 +31,15 @@ def write_scene(
     out: str | Path,
     detection: DetectionSettings | None = None,
 ) -> dict[str, Any]:
-    """Write the best, median or worst test crop of a model for the page.
+    """Write the best, median or worst test crop of a model for the report.
 
-    Arrays are little-endian and in base64: ``zyx`` (M, 3) int16 voxels, ``class`` (M,) uint8 places
-    in ``classes``, ``steps`` (M,) uint16 thresholds that the probability reaches, ``tower`` (M,)
-    uint8 truth, and for a SCENE-Net ``shares`` by GENEO, (M,) int8 percent of the answer. ``true``
-    and ``false`` are the counts of all voxels of the grid, empty ones included, that reach i of the
-    thresholds ``taus``, so that scores at any of them can be told without the grid. ``whole`` (M,)
-    uint8 says which voxels are of whole towers found at the model's tau, ``whole_scores`` what that
-    is worth over the grid.
+    Arrays are little-endian and in base64: ``zyx`` (M, 3) int16 voxels; ``class`` (M,) uint8
+    indices into ``classes``; ``steps`` (M,) uint16 number of thresholds that the probability
+    reaches; ``tower`` (M,) uint8 labels; for a SCENE-Net ``shares`` by GENEO, (M,) int8 per cent
+    of the output. ``true`` and ``false`` are the numbers of voxels of the grid, empty ones
+    included, that reach exactly i of the thresholds ``taus``, so that scores at any threshold
+    follow without the grid. ``whole`` (M,) uint8 marks the voxels of whole towers found at the tau
+    of the model, ``whole_scores`` are their scores over the grid.
 
     Args:
         model: name of the model; its seed that is best on validation is shown.
@@ -100,7 +102,7 @@ def write_scene(
 
 
 def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) -> dict[str, str]:
-    """The part of each GENEO in the answer to each occupied voxel, coded; none for a CNN."""
+    """The share of each GENEO in the output of each occupied voxel, coded; empty for a CNN."""
     import torch
 
     from scenenet.convolution.convolve import convolve_at_voxels
@@ -112,8 +114,8 @@ def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) ->
     model = model.at(voxels.grid.voxel_size)
     occupancy, _ = batch([voxels], measurement)
     with torch.no_grad():
-        answers = convolve_at_voxels(occupancy, model.weighted_kernels())
-        parts = answers[:, model.argmax_rows(occupancy, answers.sum(dim=0))].numpy()
+        outputs = convolve_at_voxels(occupancy, model.weighted_kernels())
+        parts = outputs[:, model.argmax_rows(occupancy, outputs.sum(dim=0))].numpy()
     whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
     percent = np.rint(100 * parts / whole).astype("<i1")
     return {name: _coded(row) for name, row in zip(model.names, percent, strict=True)}

@@ -1,4 +1,4 @@
-"""Pictures of models: scores, training, kernels, numbers, studies (thesis 4.4, 5.2, 5.3).
+"""Figures of models: scores, training, kernels, parameters, studies (thesis 4.4, 5.2, 5.3).
 
 Every function that draws writes one PNG and returns (alternative text, caption).
 """
@@ -36,10 +36,10 @@ def draw_curves(results: Results, thesis: Thesis | None, out: Path) -> tuple[str
         if recall is not None and precision is not None:
             published[model] = (recall, precision)
     return precision_recall(curves, out, published), (
-        "Every voxel of the test crops, with changing threshold tau. Thin lines are single seeds, "
-        "the thick one is their mean with one standard deviation around it; a seed that never "
-        "reaches a recall counts as precision 0 there. Diamonds mark the thesis' scores "
-        "(Table 5.3), which were measured on other data. As thesis Figure 5.7."
+        "Precision and recall over all voxels of the test crops, for every threshold tau. Thin "
+        "lines: single seeds. Thick line: their mean, with one standard deviation; a seed that "
+        "does not reach a recall counts with precision 0 there. Diamonds: scores of the thesis "
+        "(Table 5.3), measured on other data. Compare thesis Figure 5.7."
     )
 
 
@@ -50,7 +50,7 @@ def draw_training(results: Results, model: str, out: Path) -> tuple[str, str]:
     dashed = any("validation_loss" in history for history in histories.values())
     return training(histories, out), (
         f"Training loss of {model} after each epoch, one line per seed"
-        + (", the loss on the validation crops dashed." if dashed else ".")
+        + ("; dashed: the loss on the validation crops." if dashed else ".")
     )
 
 
@@ -74,12 +74,13 @@ def draw_kernels(results: Results, model: str, out: Path) -> tuple[str, str]:
     trained, _ = read_model(champion.model_files[0])
     start = initial_model(champion, trained)
     alt = kernels(_slices(trained), out, start and _slices(start.model), trained.voxel_size)
-    before = "" if start is None else f"The rows above are those {start.origin}. "
-    figures = "As thesis Figures 4.2 to 4.4." if isinstance(trained, GeneoModel) else ""
+    before = "" if start is None else f"The upper rows show the kernels {start.origin}. "
+    figures = "Compare thesis Figures 4.2 to 4.4." if isinstance(trained, GeneoModel) else ""
     return alt, (
         f"Slices through the middle of each kernel of {model}, seed {champion.seed} (best on "
-        "validation). Red adds to the answer where a voxel is occupied, blue takes away. Each "
-        f"kernel has its own scale, the same before and after. {before}{figures}"
+        "validation). An occupied voxel raises the output where the kernel is red and lowers it "
+        "where it is blue. Each kernel has its own scale, equal before and after training. "
+        f"{before}{figures}"
     ).strip()
 
 
@@ -119,12 +120,12 @@ def draw_parameters(
         starts,
         {name: value for name, value in published.items() if name in found.after},
     )
-    hollow = f"; hollow circles are the means {found.began}" if starts else ""
+    hollow = f"; hollow circles are mean values {found.began}" if starts else ""
     return alt, (
         f"The trained parameters of {model}: bars are means over {len(found.after)} seeds with one "
-        f"standard deviation, dots are single seeds{hollow}. Lengths are in metres: kernels in "
-        "voxels times the edge of the voxels they were trained on. The last mixing weight is one "
-        "minus the others; the diamond is the thesis'. As thesis Figure 5.5."
+        f"standard deviation, dots are single seeds{hollow}. Lengths are in metres; parameters in "
+        "voxels are multiplied by the voxel edge of the training. The last mixing weight is one "
+        "minus the others. Diamond: value of the thesis. Compare thesis Figure 5.5."
     )
 
 
@@ -136,7 +137,7 @@ def draw_study(
 
     runs = results.study_runs(study.name)
     if runs is None:
-        raise InputError("has not been run", file=results.folder / "study" / study.name)
+        raise InputError("the study has not been run", file=results.folder / "study" / study.name)
     summary = summarise(study, runs, thesis or Thesis(source="", numbers={}))
     if study.is_grid:
         names, values = zip(*study.vary.items(), strict=True)
@@ -144,10 +145,12 @@ def draw_study(
         alt = studies.heat_map(summary, (first, second), (len(values[0]), len(values[1])), out)
     else:
         alt = studies.rows(summary, out)
-    hollow = " Hollow points are the thesis'." if any(v.thesis for v in study.variants) else ""
+    hollow = (
+        " Hollow points: scores of the thesis." if any(v.thesis for v in study.variants) else ""
+    )
     return alt, (
-        f"{study.asks} Scores of the tower class on the {study.part} crops at the tau that is best "
-        f"on validation, {_seeds(study)}.{hollow} Thesis {study.place}."
+        f"{study.asks} Scores of the tower class on the {study.part} crops, at the tau that is "
+        f"best on the validation crops, {_seeds(study)}.{hollow} Thesis {study.place}."
     )
 
 

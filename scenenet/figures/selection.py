@@ -1,6 +1,6 @@
-"""What is shown of all that there is: the seed that is best on validation, the crop, the points.
+"""The selection of what figures show: the best seed, a crop, a subset of points.
 
-Crops are chosen by rule (best, median, worst), never by hand.
+Crops are selected by rule (best, median, worst), never by hand.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from scenenet.pointcloud import PointCloud
 
 CLASSES = tuple(ROLE_COLOURS)
-"""What a point may be, the most important first."""
+"""Roles of points, the most important first."""
 
 POINTS_PER_PICTURE = 60_000
-"""Enough to look dense at the size the pictures have."""
+"""Enough points to look dense at the size of the figures."""
 
 
 def champion_of(results: Results, model: str) -> SeedResult:
@@ -40,12 +40,12 @@ def ranked(champion: SeedResult, rank: str) -> Mapping[str, Any]:
     """The best, median or worst test crop by F0.5; ties by name."""
     ordered = sorted(champion.evaluation["per_sample"], key=lambda s: (-s["f05"], s["id"]))
     if not ordered:
-        raise InputError(f"{champion.model} seed {champion.seed} was evaluated on no crop")
+        raise InputError(f"{champion.model} seed {champion.seed} has no evaluated crop")
     return {"best": ordered[0], "median": ordered[len(ordered) // 2], "worst": ordered[-1]}[rank]
 
 
 def crop_cloud(results: Results, sample: Mapping[str, Any]) -> PointCloud:
-    """The points of a test crop, ``sample`` being its entry in an evaluation."""
+    """The points of a test crop; ``sample`` is its entry in ``per_sample`` of an evaluation."""
     from scenenet.dataset.zarr_store import StoreReader
     from scenenet.pointcloud import PointCloud, class_scheme
 
@@ -58,7 +58,7 @@ def crop_cloud(results: Results, sample: Mapping[str, Any]) -> PointCloud:
 
 
 def voxel_classes(groups: np.ndarray, voxel: np.ndarray, index: np.ndarray) -> np.ndarray:
-    """(M,) what each occupied voxel holds: the first of ``CLASSES`` that any of its points is.
+    """(M,) class of each occupied voxel: the first of ``CLASSES`` that any of its points has.
 
     Args:
         groups: (N,) of ``ClassScheme.roles``.

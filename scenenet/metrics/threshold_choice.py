@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenenet.metrics.score_columns import BETA
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
-from scenenet.metrics.voxel_scores import BETA
 
 
 def _coarse_steps() -> np.ndarray:

@@ -267,9 +267,8 @@ def _log_datasets(client: MlflowClient, run_id: str, records: Sequence[DatasetRe
 
     inputs = []
     for record in records:
-        kind, source = (
-            ("local", {"uri": record.source}) if record.source else ("code", {"tags": {}})
-        )
+        kind = "local" if record.source else "code"
+        source: dict[str, Any] = {"uri": record.source} if record.source else {"tags": {}}
         profile = json.dumps(dict(record.profile))
         dataset = Dataset(record.name, record.digest, kind, json.dumps(source), profile=profile)
         inputs.append(DatasetInput(dataset, [InputTag("mlflow.data.context", record.context)]))

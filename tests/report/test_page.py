@@ -93,20 +93,20 @@ def test_the_opening_is_about_the_model_that_classifies_surveys(
 ):
     write_report(replace(results, predicts="cnn"), thesis, page)
     html = page.read_text(encoding="utf-8")
-    opening = html[html.index('id="overview"') :].partition("</section>")[0]
+    opening = " ".join(html[html.index('id="overview"') :].partition("</section>")[0].split())
     assert re.search(
         r"cnn, a convolutional network with [^.]*, classifies the new "
         "surveys",
         opening,
     )
     # Precision 0.4 and 0.8, F0.5 half of that.
-    assert "40% are labelled tower (precision); it finds 10% of the labelled" in opening
-    assert "seed 0, best on validation and count the voxels at or above tau" in opening
-    assert "has precision 0.80 and recall 0.20" in opening
-    assert "Its F0.5 of 0.40 is 0.20 above cnn." in opening
+    assert "40% are labelled tower (precision)" in opening
+    assert "seed 0, best on validation; they count the voxels at or above tau" in opening
+    assert "precision 0.80, recall 0.20" in opening
+    assert "F0.5 0.40, 0.20 above cnn." in opening
     write_report(results, thesis, page)
     html = page.read_text(encoding="utf-8")
-    assert "Its F0.5 of 0.20 is 0.20 below scenenet." in html
+    assert "F0.5 0.20, 0.20 below scenenet." in html
 
 
 def test_the_opening_names_a_model_that_detects_nothing(
@@ -115,7 +115,7 @@ def test_the_opening_names_a_model_that_detects_nothing(
     dead = replace(results, seeds=[1])
     write_tables(dead, thesis, results.folder / "tables")
     write_report(dead, thesis, tmp_path / "index.html")
-    assert "detects no tower voxel" in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert "It detects no tower voxel." in (tmp_path / "index.html").read_text(encoding="utf-8")
 
 
 def test_parameters_have_sentences_and_properties_are_verified(page: Path):
@@ -245,7 +245,7 @@ def test_models_that_count_in_different_ways_are_also_compared_in_the_same_way(
     out = tmp_path / "index.html"
     write_report(fresh, thesis, out)
     text = " ".join(read(out).text.split())
-    assert "count the voxels of whole towers" in text
+    assert "they count the voxels of whole towers" in text
     table = whole_towers(fresh).set_index("model")
     cnn = f"{table.loc['cnn', 'towers_f05']:.2f} against 0.90 for scenenet (whole towers)"
     assert f"Scored the same way, mean of 2 seeds: F0.5 {cnn}" in text

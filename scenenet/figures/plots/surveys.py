@@ -12,7 +12,7 @@ from scenenet.figures.plots.style import new_figure, save
 from scenenet.pointcloud.class_schemes import LOOK_COLOURS
 
 
-def crops_beside(crops: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | Path) -> str:
+def compare_crops(crops: Mapping[str, tuple[np.ndarray, np.ndarray]], out: str | Path) -> str:
     """Every crop from the side, along its line, and from above; all panels have the same scale.
 
     Args:

@@ -58,9 +58,10 @@ def _task(context: ReportContext, first: Mapping[Any, Any]) -> str:
     n_crops = context.results.of_model(first["model"])[0].evaluation["voxel"]["n_samples"]
     return (
         "This run trains models to find the towers of power lines in airborne LiDAR point clouds. "
-        "The points around each labelled tower are cut out (a crop) and put on a grid of voxels; a "
-        "model gives each voxel the probability that it is part of a tower. All scores below are "
-        f"measured on {n_crops} test crops that were not used to train or tune any model."
+        "The points around each labelled tower are cut out (a crop) and put on a grid of voxels. A "
+        "model gives each voxel the probability that it contains a tower; voxels with a probability "
+        "at or above a threshold tau are predicted as tower. All scores are measured on "
+        f"{n_crops} test crops that were not used to train or tune any model."
     )
 
 
@@ -68,20 +69,19 @@ def _headline(context: ReportContext, first: Mapping[Any, Any]) -> str:
     return (
         f"{first['model']}, {_kind(context, first)}, classifies the new surveys. Of the voxels it "
         f"predicts as tower, {first['precision']:.0%} are labelled tower (precision); it finds "
-        f"{first['recall']:.0%} of the labelled tower voxels (recall). The numbers are for "
-        f"{_seeds(first)} and count {_counted(first)}."
+        f"{first['recall']:.0%} of the labelled tower voxels (recall). These numbers are for "
+        f"{_seeds(first)}; they count {_counted(first)}."
     )
 
 
 def _comparison(context: ReportContext, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
     """The scores of another model, compared with the first one counted in the same way."""
-    name = f"{other['model']}, {_kind(context, other)},"
-    if not other["recall"]:
-        return f"{name} detects no tower voxel."
     scores = (
-        f"{name} has precision {other['precision']:.2f} and recall {other['recall']:.2f} "
-        f"({_seeds(other)}; {_counted(other)})."
+        f"{other['model']}, {_kind(context, other)}: precision {other['precision']:.2f}, recall "
+        f"{other['recall']:.2f} ({_seeds(other)}; {_counted(other)})."
     )
+    if not other["recall"]:
+        return f"{scores} It detects no tower voxel."
     if other["voxels"] == first["voxels"]:
         return f"{scores} {_difference(other['f05'], first['f05'], str(first['model']))}"
     return f"{scores}{_same_way(context, other, first)}"
@@ -90,10 +90,10 @@ def _comparison(context: ReportContext, other: Mapping[Any, Any], first: Mapping
 def _difference(other: float, first: float, name: str) -> str:
     difference = other - first
     if abs(difference) < SAME:
-        verdict = f"equal to {name}"
+        verdict = f"as {name}"
     else:
         verdict = f"{abs(difference):.2f} {'above' if difference > 0 else 'below'} {name}"
-    return f"Its F0.5 of {other:.2f} is {verdict}."
+    return f"F0.5 {other:.2f}, {verdict}."
 
 
 def _same_way(context: ReportContext, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
@@ -115,12 +115,12 @@ def _terms(models: pd.DataFrame) -> str:
     """What a reader needs to know to read the scores."""
     trivial = models.loc[models["model"] == TRIVIAL, "miou"].iloc[0]
     return (
-        "F0.5 combines precision and recall and gives precision twice the weight. Each model has a "
-        "threshold tau for its probability, chosen on validation crops. Two ways to count are "
-        "reported: the voxels with a probability at or above tau, as in the thesis, and all voxels "
-        "of the whole towers that are found with them. The IoU of the thesis is the mean over "
-        f"background and tower: a model that never predicts tower already scores {trivial:.2f}. "
-        "Therefore the IoU of the tower class alone is always given as well."
+        "F0.5 combines precision and recall and gives precision twice the weight. tau is chosen on "
+        "validation crops. Scores count in one of two ways: the voxels at or above tau, as in the "
+        "thesis, or all voxels of the whole towers that are found with them. The IoU (intersection "
+        "over union) of the thesis is the mean over background and tower; a model that never "
+        f"predicts tower already scores {trivial:.2f}, so the IoU of the tower class alone is given "
+        "as well. A model is live if it detects at least one tower voxel."
     )
 
 
@@ -134,7 +134,7 @@ def _counted(row: Mapping[Any, Any]) -> str:
 def _seeds(row: Mapping[Any, Any]) -> str:
     """Which trainings a row is of: ``all seeds``, or ``seed 3, best on validation``."""
     counted = str(row["counted"])
-    return f"the mean of {counted}" if counted == "all seeds" else counted
+    return f"mean of {counted}" if counted == "all seeds" else counted
 
 
 def _representative(models: pd.DataFrame, name: str) -> Mapping[Any, Any]:

@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in words a person can act on."""
+"""Messages about wrong settings, with a correct line to copy."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Place = tuple[int | str, ...]
 
 
 def explain(error: ValidationError, model: type[BaseModel]) -> str:
-    """One paragraph per wrong setting: its key, the problem, and the line as it could be written.
+    """One paragraph per wrong setting: its key, the problem, and an example line.
 
     Args:
-        error: what pydantic found.
-        model: the model that was read, to look up names, defaults and descriptions.
+        error: of pydantic.
+        model: the settings model, to look up names, defaults and descriptions.
     """
     details = error.errors()
     wrong = {item["loc"] for item in details}
@@ -27,8 +27,8 @@ def explain(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _follows(place: Place, wrong: set[Place]) -> bool:
-    """Whether a mistake is only another one seen twice: a list counts as too short when an entry of
-    it is wrong, and the common training settings are copied into each model."""
+    """Whether an error only repeats another: a list counts as too short if one of its entries is
+    wrong, and the common training settings are copied into each model."""
     copied = place[:1] == ("models",) and place[2:3] == ("training",) and place[2:] in wrong
     return copied or any(
         len(other) > len(place) and other[: len(place)] == place for other in wrong
@@ -42,7 +42,7 @@ def _paragraph(item: ErrorDetails, model: type[BaseModel]) -> str:
         known = list(_fields(model, place[:-1]))
         close = difflib.get_close_matches(str(place[-1]), known, n=1, cutoff=0.5)
         if not close:
-            return f"  {key}: there is no such setting. There are: {_known(model, place[:-1])}"
+            return f"  {key}: there is no such setting. Settings: {_known(model, place[:-1])}"
         right = (*place[:-1], close[0])
         return f"  {key}: there is no such setting. Did you mean {close[0]!r}? Write\n" + _snippet(
             right, item["input"]
@@ -69,7 +69,7 @@ def _dotted(place: Place) -> str:
 
 
 def _snippet(place: Place, value: Any) -> str:
-    """The setting as it stands in a YAML file; entries of a list stand alone."""
+    """The setting as lines of a YAML file; for an entry of a list, the entry alone."""
     first = max((i + 1 for i, part in enumerate(place) if isinstance(part, int)), default=0)
     *groups, key = place[first:]
     lines = [f"{'  ' * depth}{group}:" for depth, group in enumerate(groups)]
@@ -79,7 +79,7 @@ def _snippet(place: Place, value: Any) -> str:
 
 
 def _meaning(model: type[BaseModel], place: Place) -> str:
-    """Description of the field at ``place``, in brackets."""
+    """Description of the setting at ``place``, in brackets."""
     field = _field(model, place)
     return f" ({field.description})" if field is not None and field.description else ""
 
@@ -91,14 +91,14 @@ def _default(model: type[BaseModel], place: Place) -> Any:
 
 
 def _field(model: type[BaseModel], place: Place) -> Any:
-    """The field at ``place``, or the one whose value holds it; None if there is none."""
+    """The field at ``place``, or the field that contains it; None if there is none."""
     while place and isinstance(place[-1], int):
         place = place[:-1]
     return _fields(model, place[:-1]).get(str(place[-1])) if place else None
 
 
 def _fields(model: type[BaseModel], place: Place) -> dict[str, Any]:
-    """Name -> field of the model at ``place``; empty where there is no model."""
+    """Name -> field of the model at ``place``; empty if there is no model."""
     inside: type[BaseModel] | None = model
     for part in place:
         if isinstance(part, int):

@@ -1,4 +1,4 @@
-"""The JSON schemas and the table of settings, written from the models."""
+"""The JSON schemas and the table of settings, generated from the settings models."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
 
 
 def schemas() -> dict[str, dict[str, Any]]:
-    """File name -> JSON schema of what it describes."""
+    """File name -> JSON schema."""
     draft = "https://json-schema.org/draft/2020-12/schema"
     return {
         "config.schema.json": {"$schema": draft, **Config.model_json_schema()},
@@ -54,6 +54,7 @@ def schemas() -> dict[str, dict[str, Any]]:
 
 
 def write_schemas(folder: str | Path) -> None:
+    """Write the JSON schemas as files in ``folder``."""
     for name, schema in schemas().items():
         write_json(Path(folder) / name, schema)
 
@@ -72,11 +73,12 @@ def reference() -> str:
 
 
 def write_reference(path: str | Path) -> None:
+    """Write the table of settings as a Markdown file."""
     write_text(path, reference())
 
 
 def settings_of(model: type[BaseModel], prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
-    """Dotted name and field of every setting that is not a section itself."""
+    """Dotted name and field of every setting that is not a group of settings."""
     for name, field in model.model_fields.items():
         annotation = field.annotation
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
@@ -102,7 +104,7 @@ def main() -> None:
     parser.add_argument("--reference", metavar="FILE", help="write the table of settings to it")
     chosen = parser.parse_args()
     if chosen.schema is None and chosen.reference is None:
-        parser.error("say what to write: --schema, --reference or both")
+        parser.error("give --schema, --reference or both")
     if chosen.schema is not None:
         write_schemas(chosen.schema)
     if chosen.reference is not None:

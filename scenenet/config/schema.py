@@ -1,8 +1,8 @@
-"""The configuration of the workflow: gathers the settings models, which stand beside their stages.
+"""The configuration of the workflow: the settings models of all stages together.
 
-Nothing is set here that a stage has a setting for, and reading a configuration loads no torch, so
-that a workflow can plan in a second. ``scenenet.config.reference`` writes
-the JSON schemas and the table of settings that are kept in the repository.
+Settings of a stage are declared with the stage and not here. Reading a configuration does not load
+torch, so that the workflow plans in about a second. ``scenenet.config.reference`` writes the JSON
+schemas and the table of settings in the repository.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ Seed = Annotated[int, Field(ge=0)]
 
 
 class NewSurveys(Settings):
-    """The inbox: surveys that are only predicted, without a row in the sheet."""
+    """The inbox: surveys that are only classified and need no row in the survey sheet."""
 
     folder: str | None = Field(
-        "surveys", description="every LAS and LAZ file in it is classified; null for no inbox"
+        "surveys", description="folder whose LAS and LAZ files are classified; null for no inbox"
     )
-    codes: Codes = Field("asprs", description="class codes of these files, where they have labels")
+    codes: Codes = Field("asprs", description="class scheme of these files, if they have labels")
 
 
 class SyntheticSurvey(SyntheticSettings):
@@ -53,41 +53,47 @@ class SyntheticSurvey(SyntheticSettings):
 
 
 class Synthetic(Settings):
-    """Surveys made by the workflow; the sheet says which are used, and how."""
+    """Synthetic surveys that the workflow can make; the survey sheet says which are used."""
 
-    surveys: tuple[SyntheticSurvey, ...] = Field((), description="surveys that can be made")
+    surveys: tuple[SyntheticSurvey, ...] = Field(
+        (), description="synthetic surveys that the workflow can make"
+    )
 
 
 class Prediction(PredictSettings):
-    """How whole surveys are classified, and by which model."""
+    """How surveys are classified, and by which model."""
 
-    model: str = Field("scenenet", description="name of the model whose best seed predicts")
+    model: str = Field(
+        "scenenet", description="name of the model whose best seed classifies surveys"
+    )
 
 
 class Config(Settings):
-    """Everything a run of the workflow can be told."""
+    """All settings of a run of the workflow."""
 
     dataset: str = Field(
-        "surveys", min_length=1, description="name of the data, in MLflow and in the report"
+        "surveys", min_length=1, description="name of the data in MLflow and in the report"
     )
     results_dir: str = Field("results", min_length=1, description="folder for every result")
     surveys: str | None = Field(
-        "config/surveys.tsv", description="survey sheet; null where there are only TS40K samples"
+        "config/surveys.tsv", description="survey sheet; null if there are only TS40K samples"
     )
     ts40k_dir: str | None = Field(
         None, description="folder of TS40K samples (.npy, .pt) to train on"
     )
     ts40k_codes: Codes = Field(
-        "edp", description="their class codes: edp, or ts40k for the six merged classes of .pt"
+        "edp",
+        description="class scheme of the TS40K samples: edp, or ts40k for the six merged "
+        "classes of .pt files",
     )
     new_surveys: NewSurveys = NewSurveys()
     content_below: int = Field(
         FULL_BELOW_BYTES // 1024**2,
         ge=0,
-        description="MiB; smaller surveys count as changed when their content is another one, "
-        "larger ones when size or date are, because reading them takes seconds",
+        description="MiB; smaller surveys count as changed if their content changes, larger ones "
+        "if their size or date changes, because reading them takes seconds",
     )
-    thesis: str = Field("config/thesis.yaml", description="published numbers to stand beside ours")
+    thesis: str = Field("config/thesis.yaml", description="published numbers to compare with")
     synthetic: Synthetic = Synthetic()
     check: CheckSettings = CheckSettings()
     towers: TowerSettings = TowerSettings()
@@ -95,15 +101,16 @@ class Config(Settings):
     voxels: VoxelSettings = VoxelSettings()
     split: SplitSettings = SplitSettings()
     training: TrainingSettings = Field(
-        TrainingSettings(), description="of every model that does not say otherwise itself"
+        TrainingSettings(), description="training settings of every model that does not set its own"
     )
     models: tuple[ModelSettings, ...] = Field(min_length=1, description="models to train")
     seeds: tuple[Seed, ...] = Field(
-        min_length=1, description="each model is trained once from each of these"
+        min_length=1, description="every model is trained once from each seed"
     )
     tuning: TuningSettings = TuningSettings()
     studies: tuple[StudySettings, ...] = Field(
-        (), description="many small trainings that differ in one thing; config/studies.yaml"
+        (),
+        description="series of short trainings that differ in one setting; see config/studies.yaml",
     )
     cross_validation: CrossValidationSettings = CrossValidationSettings()
     label_noise: LabelNoiseSettings = LabelNoiseSettings()
@@ -122,7 +129,7 @@ class Config(Settings):
     @model_validator(mode="before")
     @classmethod
     def _common_training(cls, raw: Any) -> Any:
-        """Give every model the common training settings under its own."""
+        """Complete the training settings of every model with the common ones."""
         if not isinstance(raw, Mapping):
             return raw
         common, models = raw.get("training"), raw.get("models")
@@ -145,7 +152,7 @@ class Config(Settings):
             ("studies", [study.name for study in self.studies]),
         ):
             if twice := [str(name) for name, count in Counter(names).items() if count > 1]:
-                raise ValueError(f"{what}: {', '.join(twice)} is there more than once")
+                raise ValueError(f"{what}: {', '.join(twice)} is listed more than once")
         known = [model.name for model in self.models]
         if self.predict.model not in known:
             raise ValueError(
@@ -184,24 +191,24 @@ class Config(Settings):
         return next(study for study in self.studies if study.name == name)
 
     def synthetic_named(self, name: str) -> SyntheticSettings:
-        """The settings of a synthetic survey, apart from its name."""
+        """The settings of a synthetic survey without its name."""
         survey = next(survey for survey in self.synthetic.surveys if survey.name == name)
         return SyntheticSettings(**survey.model_dump(exclude={"name"}))
 
     def plain(self) -> dict[str, Any]:
-        """All settings, defaults included, as dicts, lists, texts and numbers."""
+        """All settings with defaults, as dicts, lists, strings and numbers."""
         return self.model_dump(mode="json")
 
 
 def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
-    """Check a configuration and fill in the defaults.
+    """Validate a configuration and fill in the defaults.
 
     Args:
         raw: as read from YAML.
-        file: what to call it in messages.
+        file: its name in messages.
 
     Raises:
-        InputError: names every key that is wrong, what is wrong with it, and how to write it.
+        InputError: names every wrong key, the problem, and a correct line.
     """
     try:
         return Config.model_validate(dict(raw))
@@ -210,7 +217,7 @@ def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
 
 
 def merged(base: Mapping[str, Any], over: Any) -> Any:
-    """``over`` on top of ``base``; mappings are merged key by key, all else is replaced."""
+    """``base`` overridden by ``over``: mappings are merged key by key, other values replaced."""
     if not isinstance(over, Mapping):
         return over
     both = dict(base)

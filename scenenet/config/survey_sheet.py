@@ -1,4 +1,4 @@
-"""Which surveys there are: the survey sheet, the inbox and the folder of TS40K samples."""
+"""The surveys of a run: the survey sheet, the inbox and the folder of TS40K samples."""
 
 from __future__ import annotations
 
@@ -25,22 +25,24 @@ Origin = Literal["file", "synthetic", "ts40k"]
 LAS_SUFFIXES = (".las", ".laz")
 SURVEY_SUFFIXES = (*LAS_SUFFIXES, ".npy", ".pt")
 RESULTS = "{results_dir}"
-"""Stands for the result folder in a path of the sheet."""
+"""Placeholder for the result folder in a path of the sheet."""
 
 TS40K = "ts40k"
-"""Name of the survey that the folder of TS40K samples becomes."""
+"""Name of the survey made of the folder of TS40K samples."""
 
 
 class SurveyRow(Settings):
-    """A row of the survey sheet, a text file with a tab between columns."""
+    """A row of the survey sheet, a text file with tabs between the columns."""
 
-    survey: str = Field(pattern=NAME, max_length=100, description="name, used for files")
+    survey: str = Field(
+        pattern=NAME, max_length=100, description="name of the survey, used in file names"
+    )
     path: str = Field(
         min_length=1,
-        description="LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples; from the root "
-        f"of the project, or absolute; {RESULTS}/synthetic/NAME.laz is a synthetic survey",
+        description="LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples; relative to "
+        f"the root of the project, or absolute; {RESULTS}/synthetic/NAME.laz is a synthetic survey",
     )
-    codes: Codes = Field(description="what the class codes mean")
+    codes: Codes = Field(description="class scheme of the labels")
     role: Role = Field(description="train: part of the dataset; new: only classified")
 
 
@@ -53,11 +55,11 @@ class Survey:
 
     Attributes:
         name: unique; names its files.
-        path: where it is, as seen from the root of the project.
+        path: relative to the root of the project, or absolute.
         codes: class scheme of its labels.
         role: train or new.
-        origin: ``file`` for one that somebody recorded, ``synthetic`` for one that the workflow
-            makes, ``ts40k`` for a folder of samples.
+        origin: ``file`` for a recorded survey, ``synthetic`` for one that the workflow makes,
+            ``ts40k`` for a folder of samples.
     """
 
     name: str
@@ -68,15 +70,15 @@ class Survey:
 
 
 def read_surveys(config: Config, root: str | Path = ".") -> list[Survey]:
-    """Every survey of the sheet, the TS40K folder and the inbox, in this order.
+    """The surveys of the sheet, the TS40K folder and the inbox, in this order.
 
     Args:
         config: the configuration.
-        root: what relative paths start from.
+        root: folder that paths are relative to.
 
     Raises:
-        InputError: something is wrong; everything that is wrong with the sheet is listed at once,
-            with the numbers of the lines.
+        InputError: something is wrong; all problems of the sheet are listed together, with the
+            numbers of their lines.
     """
     root = Path(root)
     surveys = [] if config.surveys is None else _read_sheet(config, root)
@@ -173,7 +175,7 @@ def _check_header(header: list[str], file: str) -> None:
 
 
 def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey | None, list[str]]:
-    """The survey of a row, or None if it cannot be made out, and all that is wrong with it."""
+    """The survey of a row, or None if cells are missing, and the problems of the row."""
     problems = [f"{name} is empty" for name in COLUMNS if not row.get(name)]
     if problems:
         return None, problems
@@ -195,7 +197,7 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
     if role == "new" and (root / path).is_dir():
         problems.append(f"{path} is a folder; samples in a folder can only be trained on")
     origin: Origin = "synthetic" if synthetic else "file"
-    # A code or a role that is none is among the problems, with which no survey is used.
+    # An unknown code or role is among the problems, and then the survey is not used.
     return Survey(name, path, cast(Codes, codes), cast(Role, role), origin), problems
 
 
@@ -244,8 +246,8 @@ def _ts40k(config: Config, root: Path) -> Iterator[Survey]:
 
 
 def _inbox(config: Config, root: Path, known: list[Survey]) -> Iterator[Survey]:
-    """LAS and LAZ files of the inbox that the sheet does not name. Hidden files are passed over:
-    programs that copy write to one until they have finished."""
+    """LAS and LAZ files of the inbox that the sheet does not name. Hidden files are skipped: copy
+    programs write to a hidden file until they have finished."""
     if config.new_surveys.folder is None or not (root / config.new_surveys.folder).is_dir():
         return
     listed = {(root / survey.path).resolve() for survey in known}
@@ -259,5 +261,5 @@ def _inbox(config: Config, root: Path, known: list[Survey]) -> Iterator[Survey]:
 
 
 def file_name(text: str) -> str:
-    """``text`` as it can stand in a file name: letters, digits, '_', '-' and '.'."""
+    """``text`` made fit for a file name: letters, digits, '_', '-' and '.'."""
     return re.sub(r"[^A-Za-z0-9_.-]+", "_", text).strip("_.-")[:100] or "survey"

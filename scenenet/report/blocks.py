@@ -1,4 +1,4 @@
-"""What a page is made of: sections of text, facts, tables and pictures; nothing of HTML."""
+"""The content of the report: sections of text, facts, tables and figures, independent of HTML."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from scenenet.figures import Picture
 
 NOTHING = "–"
-"""Stands where there is no number: not measured, not published, or a spread over one seed."""
+"""Shown instead of a missing number: not measured, not published, or a spread over one seed."""
 
 Format = Literal[
     "text",
@@ -39,8 +39,8 @@ class Column:
         name: column of the data frame.
         label: heading, with the unit.
         format: how its values are written.
-        spread: column with the standard deviation, written behind the value.
-        published: whether the numbers are the thesis'; they are set apart by their look.
+        spread: column with the standard deviation, written after the value.
+        published: whether the numbers are those of the thesis; they have another style.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Text:
 
 @dataclass(frozen=True)
 class Notes:
-    """Points to heed, such as the warnings of a check."""
+    """A list of notes, such as the warnings of a check."""
 
     title: str
     items: Sequence[str]
@@ -71,7 +71,7 @@ class Notes:
 
 @dataclass(frozen=True)
 class Facts:
-    """A few numbers that stand for themselves: (label, value) pairs."""
+    """A few single numbers: (label, value) pairs."""
 
     items: Sequence[tuple[str, str]]
     kind: str = "facts"
@@ -79,7 +79,7 @@ class Facts:
 
 @dataclass(frozen=True)
 class Table:
-    """A table as it is shown; ``folded`` ones open on demand."""
+    """A table as shown; a ``folded`` table opens on demand."""
 
     caption: str
     columns: Sequence[Column]
@@ -97,7 +97,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Scene:
-    """A crop that can be turned; ``data`` is of ``scenenet.figures.interactive_crop``."""
+    """An interactive crop; ``data`` is from ``scenenet.figures.interactive_crop``."""
 
     name: str
     title: str
@@ -110,7 +110,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Heading:
-    """A part of a section that the contents list does not name."""
+    """A heading inside a section, not in the list of contents."""
 
     text: str
     kind: str = "heading"
@@ -121,7 +121,7 @@ Block = Text | Notes | Facts | Table | Figure | Scene | Heading
 
 @dataclass
 class Section:
-    """A part of the page with an entry in the contents."""
+    """A part of the report with an entry in the list of contents."""
 
     id: str
     title: str
@@ -135,10 +135,9 @@ def table(
     source: str | None = None,
     folded: bool = False,
 ) -> Table:
-    """A data frame with chosen columns, written for people.
+    """A data frame with selected columns, formatted.
 
-    Columns that have no value in any row are left out, so that a spread over one seed or a number
-    the thesis does not give leaves no empty column behind.
+    Columns without any value are left out, such as numbers that the thesis does not report.
     """
     shown = [column for column in columns if frame[column.name].notna().any()]
     rows = [[_cell(row, column) for column in shown] for row in frame.to_dict("records")]
@@ -146,7 +145,7 @@ def table(
 
 
 def write(value: Any, how: Format) -> str:
-    """A value as people read it."""
+    """A value as text."""
     if value is None or (isinstance(value, float) and math.isnan(value)) or str(value) == "<NA>":
         return NOTHING
     return _WRITERS[how](value)
@@ -160,13 +159,13 @@ def _cell(row: Mapping[Any, Any], column: Column) -> str:
     if NOTHING in (text, spread):
         return text
     if column.format == "number":
-        # As many decimals as the value it belongs to has.
+        # With the decimals of its value.
         spread = f"{deviation:.{0 if abs(value) >= 100 else 2}f}"
     return f"{text} ± {spread}"
 
 
 def _decimals(value: float) -> int:
-    """As many as a number of this size needs: 2, none from 100 on and for whole numbers."""
+    """Number of decimals: 2; 0 from 100 on and for whole numbers."""
     return 0 if abs(value) >= 100 or value == round(value) else 2
 
 
@@ -181,7 +180,7 @@ def _seconds(value: float) -> str:
 _WRITERS: Mapping[str, Callable[[Any], str]] = {
     "text": str,
     "sentence": str,
-    # A narrow space between thousands, as SI has it: no language reads it as a decimal sign.
+    # A narrow space between thousands (SI), which cannot be taken for a decimal sign.
     "count": lambda value: f"{round(value):,}".replace(",", "\u202f"),
     "score": lambda value: f"{value:.3f}",
     "score2": lambda value: f"{value:.2f}",

@@ -1,4 +1,4 @@
-"""Every training as a run in MLflow, to be compared side by side."""
+"""Every training as a run in MLflow."""
 
 from scenenet.tracking.model_runs import model_groups
 from scenenet.tracking.run_log import RunGroup, RunRecord, log_runs

@@ -1,7 +1,7 @@
-"""A tuned model as MLflow serves it: a batch of voxel grids in, probabilities out.
+"""A tuned model in the form that MLflow serves: voxel grids in, probabilities out.
 
-MLflow keeps this file beside the model file and runs it where the model is loaded, so there is no
-pickle, and ``mlflow.pyfunc.load_model`` needs nothing but the package.
+MLflow stores this file with the model file and runs it when the model is loaded. So there is no
+pickle, and ``mlflow.pyfunc.load_model`` needs only the package.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from mlflow.pyfunc import PythonModel
 
 
 class TowerModel(PythonModel):
-    """Probability of each voxel to hold a tower (thesis 4.3)."""
+    """Probability of each voxel to contain a tower (thesis 4.3)."""
 
     def load_context(self, context: Any) -> None:
         from scenenet.models.model_file import read_model
@@ -28,8 +28,8 @@ class TowerModel(PythonModel):
         """Probabilities of a batch of any size.
 
         Args:
-            model_input: (B, D, H, W) measurement phi of each voxel, 0 where it is empty; axes
-                z (up), y, x. Presence or density, in voxels of the size the model was trained at.
+            model_input: (B, D, H, W) measurement phi of each voxel, 0 if it is empty; axes
+                z (up), y, x. Presence or density, in voxels of the size of the training.
 
         Returns:
             (B, D, H, W) float32 in [0, 1]; the tower voxels are those of at least the model's tau.

@@ -1,4 +1,4 @@
-"""The MLflow store: a database made before anything logs, and the experiments in it."""
+"""The MLflow store: a database that is created before anything is logged, and its experiments."""
 
 from __future__ import annotations
 
@@ -26,41 +26,39 @@ if TYPE_CHECKING:
 SQLITE = "sqlite:///"
 STORE_TAG = "scenenet.dataset.zarr_store"
 EXPERIMENT_TAGS = {"mlflow.experimentKind": "custom_model_development"}
-"""Opens the experiment in MLflow's view of trainings instead of the one for language models."""
+"""Makes MLflow show the experiment as model training and not as language model work."""
 
 
 class TrackingSettings(Settings):
-    """Where runs are logged."""
+    """The MLflow store."""
 
     uri: str = Field(
         "sqlite:///mlflow.db",
         min_length=1,
         description="MLflow tracking store: sqlite:///FILE or the address of an MLflow server",
     )
-    experiment: str = Field(
-        "scenenet", min_length=1, description="MLflow experiment the runs are listed under"
-    )
+    experiment: str = Field("scenenet", min_length=1, description="name of the MLflow experiment")
 
 
 def create_store(
     settings: TrackingSettings, record: str | Path, experiments: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Make the store if there is none, and the experiments in it, before anything logs.
+    """Create the store and its experiments, unless they exist, before anything is logged.
 
-    A store that is there is kept with all its runs. Safe to call from several processes at once.
+    An existing store is kept with all its runs. Several processes may call this at once.
 
     Args:
         settings: where the store is.
-        record: JSON file to write: uri, id of the store (another one when the database is made
-            anew) and the id of each experiment.
-        experiments: names of experiments beside the one of ``settings``.
+        record: JSON file to write: uri, id of the store (a new database has a new id) and the id of
+            each experiment.
+        experiments: names of experiments in addition to that of ``settings``.
 
     Returns:
-        what was written.
+        the content of ``record``.
 
     Raises:
-        InputError: the store has the schema of another MLflow version, is no MLflow store, cannot
-            be reached, or has been moved away from its artifacts.
+        InputError: the store has the schema of another MLflow version, is not an MLflow store,
+            cannot be reached, or was moved away from its artifacts.
     """
     with exclusive(settings.uri):
         _create_database(settings.uri)
@@ -80,9 +78,9 @@ def create_store(
 
 
 def store_id(uri: str) -> str | None:
-    """Id of the SQLite store at ``uri``; None where there is none yet, or for other stores.
+    """Id of the SQLite store at ``uri``; None if it does not exist yet, and for other stores.
 
-    Reads one value and imports nothing heavy, so a workflow can ask while it plans.
+    Reads one value and imports nothing heavy, so that the workflow can call it while it plans.
     """
     database = _database(uri)
     if database is None or not database.is_file():
@@ -97,12 +95,17 @@ def store_id(uri: str) -> str | None:
 
 
 def check_same_store(settings: TrackingSettings, record: Path) -> None:
+    """Check that a store is the one that ``create_store`` recorded.
+
+    Raises:
+        InputError: it is another store.
+    """
     written = files.read_json(record)
     present = store_id(settings.uri)
     other_uri = written["uri"] != settings.uri
     if other_uri or (_database(settings.uri) is not None and written["store"] != present):
         raise InputError(
-            f"the MLflow store {settings.uri} is not the one this record is of",
+            f"the MLflow store {settings.uri} is not the one of this record",
             file=record,
             remedy="Delete the record and run the workflow again",
         )
@@ -116,7 +119,7 @@ def open_client(uri: str) -> MlflowClient:
 
 
 def _experiment(client: MlflowClient, uri: str, name: str) -> Experiment:
-    """The experiment, made if missing and restored if someone deleted it in the UI."""
+    """The experiment, created if missing and restored if it was deleted in the UI."""
     database = _database(uri)
     expected = None if database is None else database.parent.resolve() / "mlartifacts" / name
     experiment = client.get_experiment_by_name(name)
@@ -134,27 +137,27 @@ def _experiment(client: MlflowClient, uri: str, name: str) -> Experiment:
 
 
 def _check_artifacts(database: Path, location: str, expected: Path) -> None:
-    """MLflow writes absolute paths into its database, so a moved one points into nowhere."""
+    """Refuse a moved database: MLflow stores absolute paths of artifacts in it."""
     parsed = urlparse(location)
     folder = Path(unquote(parsed.path))
     if parsed.scheme not in ("", "file") or folder.is_dir():
         return
     if folder.resolve() != expected:
         raise InputError(
-            f"its artifacts are kept in {folder}, which is not there: the store was moved",
+            f"its artifacts are in {folder}, which does not exist: the store was moved",
             file=database,
-            remedy="Move it back, or set it aside; the runs are then logged anew from the results",
+            remedy="Move it back, or rename it; the runs are then logged again from the results",
         )
     folder.mkdir(parents=True)
 
 
 def _create_database(uri: str) -> None:
-    """Make a SQLite database with MLflow's tables, unless there is one already."""
+    """Create an SQLite database with the tables of MLflow, unless it exists."""
     database = _database(uri)
     if database is None or check_schema(uri):
         return
     database.parent.mkdir(parents=True, exist_ok=True)
-    # In a process of its own: it sets up logging and migrations for the whole interpreter.
+    # In a separate process, because it configures logging and migrations for the interpreter.
     done = subprocess.run(
         [sys.executable, "-m", "mlflow", "db", "upgrade", uri],
         capture_output=True,
@@ -163,14 +166,14 @@ def _create_database(uri: str) -> None:
     )
     if done.returncode:
         last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
-        raise InputError(f"the MLflow store could not be made ({''.join(last)})", file=database)
+        raise InputError(f"the MLflow store could not be created ({''.join(last)})", file=database)
 
 
 def check_schema(uri: str) -> bool:
-    """Whether there is a database with tables; MLflow would migrate an older one unasked.
+    """Whether the database has tables. MLflow would migrate an older one without asking.
 
     Raises:
-        InputError: its tables are those of another MLflow version, or not MLflow's.
+        InputError: its tables are of another MLflow version, or not of MLflow.
     """
     database = _database(uri)
     if database is None:
@@ -183,7 +186,7 @@ def check_schema(uri: str) -> bool:
             if not tables:
                 return False
             if not {"experiments", "alembic_version"} <= tables:
-                raise InputError("is a database, but not one of MLflow", file=database)
+                raise InputError("is a database, but not of MLflow", file=database)
             (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone()
     except sqlite3.DatabaseError as error:
         raise InputError(f"is not an SQLite database ({error})", file=database) from None
@@ -194,13 +197,13 @@ def check_schema(uri: str) -> bool:
     remedy = (
         f"Make a copy of the file, then run: mlflow db upgrade {uri}"
         if revision in known
-        else "Install the MLflow version that made it"
+        else "Install the MLflow version that created it"
     )
-    raise InputError(f"was made by {age} version of MLflow", file=database, remedy=remedy)
+    raise InputError(f"was created by {age} version of MLflow", file=database, remedy=remedy)
 
 
 def _schema_revisions() -> tuple[str | None, set[str]]:
-    """The schema of the installed MLflow, and all that came before."""
+    """The schema of the installed MLflow, and all earlier ones."""
     import mlflow
     from alembic.script import ScriptDirectory
 
@@ -219,7 +222,7 @@ def _database(uri: str) -> Path | None:
 
 @contextlib.contextmanager
 def exclusive(uri: str) -> Iterator[None]:
-    """One process at a time on a SQLite store; a server takes care of that itself."""
+    """Lock an SQLite store for one process; a server does that itself."""
     database = _database(uri)
     if database is None:
         yield
@@ -234,7 +237,7 @@ def exclusive(uri: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def store_errors(uri: str) -> Iterator[None]:
-    """MLflow's own complaints about the store as errors of the input."""
+    """Turn exceptions of MLflow about the store into ``InputError``."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     from mlflow.exceptions import MlflowException
 

@@ -1,4 +1,4 @@
-"""MLflow's own pages: serving them, and the addresses of its comparisons."""
+"""The MLflow user interface: serving it, and the addresses of its comparisons."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from scenenet.core.errors import InputError
 
 HOST = "127.0.0.1"
 START_LIMIT_S = 120.0
-"""How long MLflow may take until it answers; on a busy machine it takes half a minute."""
+"""Longest time, s, until MLflow must respond; on a busy machine it takes half a minute."""
 
 
 @contextlib.contextmanager
@@ -31,22 +31,22 @@ def serving(uri: str) -> Iterator[str]:
         the address of the start page.
 
     Raises:
-        InputError: MLflow stopped, or did not answer in time; with the last it said.
+        InputError: MLflow stopped or did not respond in time; with its last line of output.
     """
     port = _free_port()
     address = f"http://{HOST}:{port}"
     command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri,
                "--host", HOST, "--port", str(port), "--workers", "1"]  # fmt: skip
     environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true"}
-    with tempfile.TemporaryFile() as said:
-        # In a session of its own, because it starts processes that have to be stopped with it.
+    with tempfile.TemporaryFile() as log:
+        # In its own session, because it starts processes that must be stopped with it.
         process = subprocess.Popen(
-            command, stdout=said, stderr=said, env=environment, start_new_session=True
+            command, stdout=log, stderr=log, env=environment, start_new_session=True
         )
         try:
-            if not _answers(f"{address}/health", process):
-                said.seek(0)
-                last = said.read().decode(errors="replace").strip().splitlines()[-1:]
+            if not _responds(f"{address}/health", process):
+                log.seek(0)
+                last = log.read().decode(errors="replace").strip().splitlines()[-1:]
                 raise InputError(f"MLflow does not serve {uri} ({''.join(last)})")
             yield address
         finally:
@@ -55,13 +55,13 @@ def serving(uri: str) -> Iterator[str]:
 
 def comparison(address: str, experiment: str, runs: Sequence[str]) -> str:
     """The page that compares runs, given by their ids."""
-    asked = {"runs": json.dumps(list(runs)), "experiments": json.dumps([experiment])}
-    return f"{address}/#/compare-runs?{urlencode(asked, quote_via=quote)}"
+    query = {"runs": json.dumps(list(runs)), "experiments": json.dumps([experiment])}
+    return f"{address}/#/compare-runs?{urlencode(query, quote_via=quote)}"
 
 
 def metric_over_steps(address: str, experiment: str, runs: Sequence[str], metric: str) -> str:
     """The page that draws one metric of several runs over the epochs."""
-    asked = {
+    query = {
         "runs": json.dumps(list(runs)),
         "metric": json.dumps(metric),
         "experiments": json.dumps([experiment]),
@@ -74,7 +74,7 @@ def metric_over_steps(address: str, experiment: str, runs: Sequence[str], metric
         "deselected_curves": "[]",
         "last_linear_y_axis_range": "[]",
     }
-    return f"{address}/#/metric?{urlencode(asked, quote_via=quote)}"
+    return f"{address}/#/metric?{urlencode(query, quote_via=quote)}"
 
 
 def experiment_runs(address: str, experiment: str) -> str:
@@ -88,9 +88,9 @@ def _free_port() -> int:
         return int(taken.getsockname()[1])
 
 
-def _answers(address: str, process: subprocess.Popen[bytes]) -> bool:
-    """Whether it answers before it stops or the time is up."""
-    # Without the proxy that the environment may name: it is this machine that is asked.
+def _responds(address: str, process: subprocess.Popen[bytes]) -> bool:
+    """Whether it responds before it stops and before the time limit."""
+    # Without the proxy of the environment: the server is on this machine.
     opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
     until = time.monotonic() + START_LIMIT_S
     while time.monotonic() < until and process.poll() is None:

@@ -97,7 +97,7 @@ def test_a_key_like_no_other_is_refused_with_those_there_are():
         ({"training": {"loss": {"alpha": -1}}}, "training.loss.alpha: -1 is not allowed"),
         ({"split": {"train": 0.5}}, "split: train, validation and test must sum to 1"),
         ({"towers": 3}, "towers: is 3, but groups the settings eps, min_points, cell"),
-        ({"seeds": [0, 0]}, "seeds: 0 is there more than once"),
+        ({"seeds": [0, 0]}, "seeds: 0 is listed more than once"),
         ({"seeds": []}, "seeds: [] is not allowed"),
         ({"predict": {"model": "best"}}, "'best' is not one of the models: scenenet, cnn"),
         ({"models": [{"name": "a b", "kind": "cnn"}]}, "models[0].name: 'a b' is not allowed"),

@@ -60,7 +60,7 @@ class LabelNoiseSettings(Settings):
                 f"{self.validation} to tune on, two left out and one to test on"
             )
         if len(set(self.levels)) < len(self.levels):
-            raise ValueError("label_noise.levels: a level is there more than once")
+            raise ValueError("label_noise.levels: a level is listed more than once")
         return self
 
     def line_of(self, seed: int) -> SyntheticSettings:

@@ -59,8 +59,9 @@ def _task(context: ReportContext, first: Mapping[Any, Any]) -> str:
     return (
         "This run trains models to find the towers of power lines in airborne LiDAR point clouds. "
         "The points around each labelled tower are cut out (a crop) and put on a grid of voxels. A "
-        "model gives each voxel the probability that it contains a tower; voxels with a probability "
-        "at or above a threshold tau are predicted as tower. All scores are measured on "
+        "model gives each voxel the probability that it contains a tower; voxels with a "
+        "probability at or above a threshold tau are predicted as tower. All scores are measured "
+        "on "
         f"{n_crops} test crops that were not used to train or tune any model."
     )
 
@@ -119,8 +120,8 @@ def _terms(models: pd.DataFrame) -> str:
         "validation crops. Scores count in one of two ways: the voxels at or above tau, as in the "
         "thesis, or all voxels of the whole towers that are found with them. The IoU (intersection "
         "over union) of the thesis is the mean over background and tower; a model that never "
-        f"predicts tower already scores {trivial:.2f}, so the IoU of the tower class alone is given "
-        "as well. A model is live if it detects at least one tower voxel."
+        f"predicts tower already scores {trivial:.2f}, so the IoU of the tower class alone is "
+        f"given as well. A model is live if it detects at least one tower voxel."
     )
 
 

@@ -79,7 +79,7 @@ def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]
 def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]:
     """The median test crop on the training grid and on a grid of twice its resolution."""
     from scenenet.dataset.voxels import VoxelGrid, voxelise
-    from scenenet.figures.plots.grids import GridView, truth_and_answer
+    from scenenet.figures.plots.grids import GridView, labels_and_predictions
     from scenenet.metrics.voxel_scores import confusion
     from scenenet.models.model_file import read_model
     from scenenet.models.predictions import probabilities
@@ -104,7 +104,7 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         "m": "in metres",
         "voxel": "in voxels, with the same number of voxels on both grids",
     }[trained.units]
-    return truth_and_answer(views, card.threshold(), out), (
+    return labels_and_predictions(views, card.threshold(), out), (
         f"Crop {sample['id']}, the median test crop by F0.5 of {model}, on two grids. From the "
         f"left: voxels labelled tower; probability of {model} (seed {champion.seed}); voxels at "
         f"or above tau (green: true positive, orange: false positive, pink: false negative). The "

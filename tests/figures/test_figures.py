@@ -178,18 +178,18 @@ def test_the_start_of_a_number_and_the_thesis_stand_beside_it(tmp_path: Path):
         {"cylinder.r": 1.25},
         {"lambda.negative_sphere": 0.7634},
     )
-    assert "cylinder.r 0.6 (began at 1.25)" in alt
+    assert "cylinder.r 0.6 (initial 1.25)" in alt
     assert inked(tmp_path / "p.png") > 0.01
 
 
-def test_a_crop_on_two_grids_counts_what_is_labelled_and_what_is_answered(tmp_path: Path):
+def test_a_crop_on_two_grids_counts_labelled_and_predicted_voxels(tmp_path: Path):
     rng = np.random.default_rng(0)
     views = []
     for size, n in ((1.0, 50), (0.5, 200)):
         centres = rng.uniform(0, 20, (n, 3))
         tower = np.arange(n) < n // 10
         views.append(grids.GridView(f"{size} m", centres, size, tower, np.linspace(1, 0, n)))
-    alt = grids.truth_and_answer(views, 0.9, tmp_path / "g.png")
-    assert "1.0 m: 5 of 50 voxels labelled tower, 5 answered so" in alt
-    assert "0.5 m: 20 of 200 voxels labelled tower, 20 answered so" in alt
+    alt = grids.labels_and_predictions(views, 0.9, tmp_path / "g.png")
+    assert "1.0 m: 5 of 50 voxels labelled tower, 5 predicted" in alt
+    assert "0.5 m: 20 of 200 voxels labelled tower, 20 predicted" in alt
     assert inked(tmp_path / "g.png") > 0.01

@@ -1,7 +1,7 @@
-"""Lines: training, precision and recall.
+"""Line charts: training, precision and recall.
 
-Every function draws plain data into one PNG and returns the alternative text of what it drew, with
-the numbers a person would read off, for those who cannot see it.
+Every function draws plain data into one PNG and returns its alternative text, which contains the
+numbers that the chart shows.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Curve = Mapping[str, Sequence[float]]
 
 
 def training(histories: Mapping[str, pd.DataFrame], out: str | Path) -> str:
-    """Loss per epoch, a line per training, and its validation loss dashed where there is one.
+    """Loss per epoch, a line per training; the validation loss is dashed, if there is one.
 
     Args:
         histories: label -> table with columns epoch, loss and perhaps validation_loss.
@@ -48,7 +48,7 @@ def training(histories: Mapping[str, pd.DataFrame], out: str | Path) -> str:
 def parameter_paths(
     histories: Mapping[str, pd.DataFrame], names: Sequence[str], out: str | Path
 ) -> str:
-    """How each parameter moves over the epochs, a panel per parameter and a line per training.
+    """Every parameter over the epochs, a panel per parameter and a line per training.
 
     Args:
         histories: label -> table with a column ``epoch`` and one for each of ``names``.
@@ -84,8 +84,8 @@ def precision_recall(
     """Precision against recall with changing tau (thesis Figure 5.7).
 
     A thin line is one seed, the thick line the mean precision over the seeds at each recall, the
-    band one standard deviation around it. A seed counts as precision 0 at recalls it never
-    reaches, so that a dead seed weighs down the mean instead of vanishing from it.
+    band one standard deviation around it. A seed counts as precision 0 at a recall that it
+    does not reach, so that a dead model lowers the mean instead of being left out.
 
     Args:
         curves: model -> one curve per seed.
@@ -125,7 +125,7 @@ def precision_recall(
 
 
 def _precision_at(curve: Curve, recall: np.ndarray) -> np.ndarray:
-    """Precision where a curve first has each recall; 0 at recalls it never reaches."""
+    """Precision at which a curve first has each recall; 0 at a recall that it does not reach."""
     have = np.asarray(curve["recall"], float)
     precision = np.asarray(curve["precision"], float)
     # By recall, and the higher precision first where several thresholds have the same.
@@ -135,6 +135,6 @@ def _precision_at(curve: Curve, recall: np.ndarray) -> np.ndarray:
 
 
 def _area(curve: Curve) -> float:
-    """Average precision: the sum over tau of precision times the recall that is gained there."""
+    """Average precision: the sum over tau of precision times the gain of recall."""
     gained = -np.diff(np.append(np.asarray(curve["recall"], float), 0.0))
     return float((np.asarray(curve["precision"], float) * gained).sum())

@@ -1,4 +1,4 @@
-"""One crop on several grids: what is labelled, and what a model answers (thesis Figure 5.10)."""
+"""One crop on several grids: labels and predictions of a model (thesis Figure 5.10)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ PANEL = 3.4
 """Inches, width of a panel."""
 
 QUIET = "#B5BAC1"
-FOUND = {"no tower": (True, False, "#E69F00"), "right": (True, True, "#009E73"),
-         "missed": (False, True, "#CC79A7")}  # fmt: skip
-"""What was found -> answered, labelled, colour, as on the crops that can be turned; later ones are
-drawn over earlier ones."""
+FOUND = {"false positive": (True, False, "#E69F00"), "true positive": (True, True, "#009E73"),
+         "false negative": (False, True, "#CC79A7")}  # fmt: skip
+"""Outcome -> predicted, labelled, colour, as in the interactive crops; later ones are drawn over
+earlier ones."""
 
 
 class GridView(NamedTuple):
@@ -28,7 +28,7 @@ class GridView(NamedTuple):
         title: resolution and voxel size.
         centres: (M, 3) m, of the occupied voxels.
         size: m, their edge.
-        tower: (M,) bool, the truth.
+        tower: (M,) bool, labels.
         probability: (M,) of a model.
     """
 
@@ -39,12 +39,12 @@ class GridView(NamedTuple):
     probability: np.ndarray
 
 
-def truth_and_answer(views: Sequence[GridView], tau: float, out: str | Path) -> str:
-    """A row per grid, seen from the side: the truth, the probability, and what is right at tau.
+def labels_and_predictions(views: Sequence[GridView], tau: float, out: str | Path) -> str:
+    """A row per grid, from the side: labels, probability, and the outcome at tau.
 
     Args:
         views: of one crop.
-        tau: voxels from it on are answered as tower.
+        tau: voxels at or above it are predicted as tower.
         out: PNG to write. The horizontal axis is the planar direction in which the voxels of the
             first grid spread most; stray voxels far above the others are cut off.
 
@@ -68,16 +68,16 @@ def truth_and_answer(views: Sequence[GridView], tau: float, out: str | Path) -> 
         # In points: a voxel is as large as its edge in metres.
         size = (72 * 0.85 * PANEL * view.size / (right - left)) ** 2
         style = {"s": size, "marker": "s", "lw": 0, "rasterized": True}
-        answered = view.probability >= tau
+        predicted = view.probability >= tau
         row[0].scatter(*side[:, ~view.tower], c=QUIET, **style)
         row[0].scatter(*side[:, view.tower], c=TOWER_COLOUR, **style)
-        # The likeliest last, so that what stands before them does not hide them.
+        # The most probable last, so that no other voxel hides them.
         order = np.argsort(view.probability, kind="stable")
         shown = row[1].scatter(*side[:, order], c=view.probability[order], cmap="viridis",
                                vmin=0, vmax=1, **style)  # fmt: skip
-        row[2].scatter(*side[:, ~view.tower & ~answered], c=QUIET, **style)
-        for name, (said, truth, colour) in FOUND.items():
-            member = (answered == said) & (view.tower == truth)
+        row[2].scatter(*side[:, ~view.tower & ~predicted], c=QUIET, **style)
+        for name, (detected, labelled, colour) in FOUND.items():
+            member = (predicted == detected) & (view.tower == labelled)
             row[2].scatter(*side[:, member], c=colour, label=name, **style)
         row[0].set(ylabel="height [m]", xlim=(left, right), ylim=(low, high))
         for axis, title in zip(row, ("labelled tower", "probability", f"at tau {tau:.3f}"),
@@ -94,10 +94,10 @@ def truth_and_answer(views: Sequence[GridView], tau: float, out: str | Path) -> 
     save(figure, out)
     counts = "; ".join(
         f"{v.title}: {int(v.tower.sum())} of {len(v.tower)} voxels labelled tower, "
-        f"{int((v.probability >= tau).sum())} answered so"
+        f"{int((v.probability >= tau).sum())} predicted"
         for v in views
     )
-    return f"Side views of one crop on {len(views)} grids: truth, probability, answer. {counts}."
+    return f"Side views of one crop on {len(views)} grids: labels, probability, outcome. {counts}."
 
 
 def _frame(view: GridView, side: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,6 @@
-"""What a model has learned: kernels in slices, numbers as bars (thesis Figures 4.2 to 4.4, 5.5).
+"""Kernels as slices and parameters as bars (thesis Figures 4.2 to 4.4, 5.5).
 
-As in ``charts``, every function writes one PNG and returns its alternative text.
+Every function writes one PNG and returns its alternative text.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 KERNEL_WIDTH = 2.6
-"""Inches of a column of slices."""
+"""Width of a column of slices, inches."""
 
 UNITS = {"m": "length [m]", "m^2": "squared length [m²]", "1": "number without unit"}
-"""Unit -> what stands below its bars."""
+"""Unit -> label of its axis."""
 
 
 def kernels(
@@ -34,7 +34,7 @@ def kernels(
     Args:
         weights: name -> (kz, ky, kx). One row shows z against x, the one below y against x.
         out: PNG to write.
-        starts: the same before training; two rows above the others, with the same colours.
+        starts: the kernels before training, in two rows above the others, with the same colours.
         metres: size of a voxel where the kernels are in metres; the axes are in voxels if None.
     """
     stages = (
@@ -53,7 +53,7 @@ def kernels(
     )
     unit = "voxel" if metres is None else "m"
     for column, name in enumerate(weights):
-        # Each kernel has its own scale: a shape of small weights would else not show.
+        # Each kernel has its own scale, or a kernel of small weights would not be visible.
         limit = max(float(np.abs(stage[name]).max()) for stage in stages.values()) or 1.0
         images = []
         for row, (stage, view) in enumerate(views):
@@ -102,7 +102,7 @@ def parameters(
         values: parameter, such as ``cylinder.r`` -> one value per seed.
         out: PNG to write. Mixing weights (``lambda.``) have a panel of their own, and so has each
             unit.
-        units: parameter -> ``m``, ``m^2`` or ``1``, which those have that are not named.
+        units: parameter -> ``m``, ``m^2`` or ``1``; ``1`` for those that are not named.
         starts: parameter -> its mean before training, drawn as a hollow circle.
         published: parameter -> the thesis' value, drawn as a diamond.
     """
@@ -129,11 +129,11 @@ def parameters(
         axis.invert_yaxis()
         axis.set_xlabel(label)
     save(figure, out)
-    said = ", ".join(
-        f"{name} {np.mean(v):.3g}" + (f" (began at {starts[name]:.3g})" if name in starts else "")
+    means = ", ".join(
+        f"{name} {np.mean(v):.3g}" + (f" (initial {starts[name]:.3g})" if name in starts else "")
         for name, v in values.items()
     )
-    return f"Bars of the mean learned parameters with a dot for each seed: {said}."
+    return f"Bars of the mean learned parameters with a dot for each seed: {means}."
 
 
 def _bars(axis: Axes, values: Mapping[str, Sequence[float]], colour: str) -> None:
@@ -146,7 +146,7 @@ def _bars(axis: Axes, values: Mapping[str, Sequence[float]], colour: str) -> Non
 
 
 def _extent(shape: tuple[int, ...], step: float) -> tuple[float, float, float, float]:
-    """Borders (left, right, bottom, top) of a slice about the element that it answers for."""
+    """Borders (left, right, bottom, top) of a slice around the element that the kernel is for."""
     rows, columns = shape
     left, bottom = (-((n - 1) // 2) - 0.5 for n in (columns, rows))
     return step * left, step * (left + columns), step * bottom, step * (bottom + rows)

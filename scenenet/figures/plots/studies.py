@@ -1,4 +1,4 @@
-"""A study in one picture: a row for each variant, or a map where two settings are varied."""
+"""A study in one figure: a row per variant, or a map if two settings are varied."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def rows(summary: pd.DataFrame, out: str | Path) -> str:
     """Precision, recall and F0.5 of each variant, with their spread over seeds.
 
     Args:
-        summary: of ``scenenet.experiments.studies.summary``; what the thesis published is drawn
-        hollow. out: PNG to write.
+        summary: of ``scenenet.experiments.studies.summary``; scores of the thesis are hollow.
+        out: PNG to write.
     """
     places = np.arange(len(summary))
     figure, axes = new_figure(1, 1, width=7.2, height=0.42 * len(summary) + 1.3)
@@ -34,11 +34,11 @@ def rows(summary: pd.DataFrame, out: str | Path) -> str:
     axis.invert_yaxis()
     legend(axis)
     save(figure, out)
-    said = "; ".join(
+    scores = "; ".join(
         f"{row.variant}: precision {row.precision:.2f}, recall {row.recall:.2f}, F0.5 {row.f05:.2f}"
         for row in summary.itertuples()
     )
-    return f"Points for the scores of each variant. {said}."
+    return f"Scores of each variant as points. {scores}."
 
 
 def heat_map(

@@ -1,4 +1,4 @@
-"""What all pictures have in common: colours, axes, saving."""
+"""Colours, axes and saving, common to all figures."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 DPI = 130
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#666666")
-"""Told apart by colour-blind readers as well (Okabe and Ito)."""
+"""Distinguishable for colour-blind readers (Okabe and Ito)."""
 
 TOWER_COLOUR = ROLE_COLOURS["tower"]
 
@@ -32,7 +32,7 @@ def new_figure(
     sharey: bool = False,
     height_ratios: Sequence[float] | None = None,
 ) -> tuple[Figure, np.ndarray]:
-    """A figure without pyplot: no display is needed, no state is kept between calls."""
+    """A figure without pyplot, which needs no display and keeps no state between calls."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(width, height), layout="constrained")
@@ -48,7 +48,7 @@ def new_figure(
 
 def save(figure: Figure, out: str | Path) -> None:
     with atomic(out) as partial:
-        # Without the version of matplotlib in it, equal pictures are equal files.
+        # Without the version of matplotlib in the file, equal pictures are equal files.
         figure.savefig(partial, dpi=DPI, facecolor="white", metadata={"Software": None})
 
 

@@ -28,8 +28,16 @@ def class_schemes() -> str:
     return markdown()
 
 
+def scores() -> str:
+    """Every score that the tables report."""
+    from scenenet.metrics.score_columns import SCORE_COLUMNS
+
+    return _table("name", ((c.name, c.unit, c.description) for c in SCORE_COLUMNS))
+
+
 TABLES: Mapping[str, Callable[[], str]] = {
     "class schemes": class_schemes,
+    "scores": scores,
     "tower list": tower_list,
 }
 """What stands in the first comment -> the table."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.scoring import score_answers
+from scenenet.evaluation.scoring import score_predictions
 from scenenet.models.settings import BOOSTED_TREES
 
 
@@ -24,7 +25,7 @@ def evaluate_boosted_trees(
     """Train the boosted trees from each seed, tune it on validation and score it on the test crops.
 
     Args:
-        outs: JSON file of each seed: what ``score_answers`` returns, and ``parameters``.
+        outs: JSON file of each seed: what ``score_predictions`` returns, and ``parameters``.
         out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels an edge
             (``scenenet.evaluation.inference_time``), ``peak_memory_mb`` of all of this.
     """
@@ -47,10 +48,11 @@ def evaluate_boosted_trees(
         seconds.append(time.perf_counter() - begin)
         model = boosted_trees.tune(grown, parts["validation"].samples)
         tau = model.threshold()
-        scores = score_answers(
+        scores = score_predictions(
             BOOSTED_TREES, seed, tau, model.probabilities, parts["test"], detection
         )
-        write_json(out, {"part": "test", "parameters": model.n_parameters()} | scores)
+        scores = replace(scores, part="test", parameters=model.n_parameters())
+        write_json(out, scores.to_json())
         if not took:
             timed = sorted(parts["test"].samples, key=lambda sample: sample.id)[:CROPS]
             edge = str(max(timed[0].grid.shape))

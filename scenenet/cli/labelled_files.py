@@ -18,7 +18,8 @@ from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.voxel_cache import Dataset, build, load
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import crop_towers
+from scenenet.evaluation.crop_towers import detect_in_crop, match_crop
+from scenenet.evaluation.result import TowerScores
 from scenenet.evaluation.scoring import score
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.models.model_file import read_model, write_model
@@ -182,11 +183,12 @@ def evaluate_files(
         for sample, crop in zip(files.dataset.samples, files.dataset.crops, strict=True):
             if sample.id not in files.survey_crops:
                 probability, _ = probabilities(trained, sample, card.measurement)
-                match += crop_towers(sample, crop, probability, card.threshold(), detection)
+                found = detect_in_crop(sample, probability, card.threshold(), detection)
+                match += match_crop(found.towers, crop)
         for survey, towers in files.surveys.items():
             match += _survey_towers(survey, towers, model, detection)
-        result["towers"] = match.scores()
-    return result | {"skipped": files.skipped}
+        result = replace(result, towers=TowerScores.of(match))
+    return result.to_json() | {"skipped": files.skipped}
 
 
 def _survey_towers(

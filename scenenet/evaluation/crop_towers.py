@@ -1,8 +1,9 @@
-"""Towers found in a crop, matched with the labelled ones."""
+"""Detection of towers in a crop, and matching with the labelled ones."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,49 +16,51 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 
 
-def _match(found: Sequence[DetectedTower], crop: Crop) -> TowerMatch:
-    return match_towers(np.array([[tower.x, tower.y] for tower in found]), crop.towers)
+@dataclass(frozen=True)
+class CropDetection:
+    """The towers detected in a crop.
+
+    Attributes:
+        towers: highest probability first.
+        voxels: (M,) bool, which occupied voxels of the crop belong to one of them.
+    """
+
+    towers: list[DetectedTower]
+    voxels: np.ndarray
 
 
-def find_in_crop(
+def detect_in_crop(
     sample: VoxelSample, probability: np.ndarray, tau: float, detection: DetectionSettings
-) -> tuple[list[DetectedTower], np.ndarray]:
-    """The towers found in a crop, and which of its occupied voxels are theirs, (M,) bool.
+) -> CropDetection:
+    """Detect the towers of a crop.
 
     Args:
         probability: (V,) of every voxel of the sample's grid.
     """
-    # A tower is made of points: a detected voxel that is empty has nothing to show a person.
-    answers = probability[sample.index]
+    # Only occupied voxels: a tower is made of points.
+    of_occupied = probability[sample.index]
     size = sample.grid.voxel_size
     edge = block_edge(size)
     # Towers are measured in blocks of about a metre: finer voxels have gaps where points are few.
     blocks, block = coarsened(Occupancy.of_grids([sample.index], None, sample.grid.shape), edge)
     coarse = VoxelGrid(sample.grid.origin, size * edge, blocks.shape)
-    highest = np.zeros(len(blocks.index), answers.dtype)
-    np.maximum.at(highest, block, answers)
+    highest = np.zeros(len(blocks.index), of_occupied.dtype)
+    np.maximum.at(highest, block, of_occupied)
     detected = np.flatnonzero(highest >= detection.threshold(tau))
     places = coarse.centres(blocks.index)
-    found = detect_towers(
+    towers = detect_towers(
         places[detected], highest[detected], among(places), coarse.voxel_size, tau, detection
     )
     centres = sample.grid.centres(sample.index)
-    theirs = np.zeros(len(centres), bool)
-    for tower in found:
-        seen = np.zeros(len(places), bool)
-        seen[detected[tower.voxels]] = True
-        theirs |= seen[block] & (answers >= tau)
-        theirs |= body_voxels(tower, centres, detection)
-    return found, theirs
+    of_a_tower = np.zeros(len(centres), bool)
+    for tower in towers:
+        in_tower = np.zeros(len(places), bool)
+        in_tower[detected[tower.voxels]] = True
+        of_a_tower |= in_tower[block] & (of_occupied >= tau)
+        of_a_tower |= body_voxels(tower, centres, detection)
+    return CropDetection(towers, of_a_tower)
 
 
-def crop_towers(
-    sample: VoxelSample,
-    crop: Crop,
-    probability: np.ndarray,
-    tau: float,
-    detection: DetectionSettings,
-) -> TowerMatch:
-    """Towers found in a crop against the true ones; probability as in ``find_in_crop``."""
-    found, _ = find_in_crop(sample, probability, tau, detection)
-    return _match(found, crop)
+def match_crop(towers: Sequence[DetectedTower], crop: Crop) -> TowerMatch:
+    """Detected towers of a crop against its labelled ones."""
+    return match_towers(np.array([[tower.x, tower.y] for tower in towers]), crop.towers)

@@ -17,7 +17,7 @@ from scenenet.baselines import boosted_trees
 from scenenet.baselines.boosted_trees import BoostedTreesSettings
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import find_in_crop
+from scenenet.evaluation.crop_towers import detect_in_crop
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.metrics.voxel_scores import Confusion, confusion
 from scenenet.models.factory import new_model
@@ -62,8 +62,8 @@ class TunedModel:
         total = Confusion()
         for sample in samples:
             probability, truth = self.answer(sample)
-            _, theirs = find_in_crop(sample, probability, self.tau, detection)
-            total += confusion(sample.spread(theirs)[0], truth, 0.5)
+            found = detect_in_crop(sample, probability, self.tau, detection)
+            total += confusion(sample.spread(found.voxels)[0], truth, 0.5)
         return total
 
     def curve(self, samples: Iterable[VoxelSample]) -> ThresholdCurve:

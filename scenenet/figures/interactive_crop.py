@@ -52,7 +52,7 @@ def write_scene(
     """
     from scenenet.dataset.voxels import VoxelSettings, voxelise
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.evaluation.crop_towers import find_in_crop
+    from scenenet.evaluation.crop_towers import detect_in_crop
     from scenenet.figures.selection import (
         champion_of,
         crop_cloud,
@@ -73,7 +73,7 @@ def write_scene(
     everywhere, truth = probabilities(trained, voxels, card.measurement)
     curve = ThresholdCurve.of(everywhere, truth)
     probability, tau = everywhere[voxels.index], card.threshold()
-    _, whole = find_in_crop(voxels, everywhere, tau, detection or DetectionSettings())
+    whole = detect_in_crop(voxels, everywhere, tau, detection or DetectionSettings()).voxels
     counts = confusion(voxels.spread(whole)[0], truth, 0.5).scores()
     taus = THRESHOLDS.astype(probability.dtype)
     zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)

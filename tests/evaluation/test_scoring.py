@@ -13,8 +13,9 @@ from scenenet.dataset.crops import Crop
 from scenenet.dataset.voxel_cache import Dataset
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import find_in_crop
-from scenenet.evaluation.scoring import evaluate, score, score_answers
+from scenenet.evaluation.crop_towers import detect_in_crop
+from scenenet.evaluation.result import Evaluation
+from scenenet.evaluation.scoring import evaluate, score, score_predictions
 from scenenet.models.base import VoxelModel
 from scenenet.models.factory import new_model
 from scenenet.models.model_file import ModelCard, write_model
@@ -78,76 +79,77 @@ def scores(model: Mock, *crops, tau: float = 0.5):
 def test_a_perfect_model_scores_one():
     result = scores(Mock(pole(5), pole(15)), crop(1, 5), crop(2, 15))
     for name in ("precision", "recall", "f05", "iou_tower", "miou"):
-        assert result["voxel"][name] == 1.0
-    assert result["towers"] == {
+        assert getattr(result.voxel, name) == 1.0
+    assert result.to_json()["towers"] == {
         "precision": 1.0, "recall": 1.0, "median_error_m": 0.0, "n_true": 2, "n_predicted": 2,
     }  # fmt: skip
-    assert result["average_precision"] == 1.0
-    assert result["alive"] is True
-    assert (result["model"], result["seed"]) == ("mock", 4)
-    assert result["voxel"]["n_samples"] == 2
-    assert result["voxel"]["tau"] == 0.5
+    assert result.average_precision == 1.0
+    assert result.alive is True
+    assert (result.model, result.seed) == ("mock", 4)
+    assert result.voxel.n_samples == 2
+    assert result.voxel.tau == 0.5
 
 
 def test_counts_of_all_crops_make_the_scores():
     # crop 1: 12 of 12 tower voxels; crop 2: 12 false ones, 12 missed
     result = scores(Mock(pole(5), pole(25)), crop(1, 5), crop(2, 15))
-    assert result["voxel"]["precision"] == 0.5
-    assert result["voxel"]["recall"] == 0.5
-    assert result["voxel"]["iou_tower"] == pytest.approx(12 / 36)
+    assert result.voxel.precision == 0.5
+    assert result.voxel.recall == 0.5
+    assert result.voxel.iou_tower == pytest.approx(12 / 36)
     volume = 2 * np.prod(SHAPE)
-    assert result["voxel"]["miou"] == pytest.approx((12 / 36 + (volume - 36) / (volume - 12)) / 2)
-    assert [(s["tp"], s["fp"], s["fn"]) for s in result["per_sample"]] == [(12, 0, 0), (0, 12, 12)]
-    assert [s["f05"] for s in result["per_sample"]] == [1.0, 0.0]
+    assert result.voxel.miou == pytest.approx((12 / 36 + (volume - 36) / (volume - 12)) / 2)
+    assert [(s.tp, s.fp, s.fn) for s in result.per_sample] == [(12, 0, 0), (0, 12, 12)]
+    assert [s.f05 for s in result.per_sample] == [1.0, 0.0]
 
 
 def test_a_model_that_says_nothing_scores_as_the_trivial_one():
     result = scores(Mock({}), crop(1, 5))
-    assert result["voxel"] == result["voxel_trivial"]
-    assert result["voxel"]["miou"] == pytest.approx(0.5, abs=0.01)
-    assert result["voxel"]["iou_tower"] == 0.0
-    assert result["alive"] is False
-    assert result["towers"]["median_error_m"] is None
-    assert result["per_sample"][0]["position_error_m"] is None
+    assert result.voxel == result.voxel_trivial
+    assert result.voxel.miou == pytest.approx(0.5, abs=0.01)
+    assert result.voxel.iou_tower == 0.0
+    assert result.alive is False
+    assert result.towers.median_error_m is None
+    assert result.per_sample[0].position_error_m is None
 
 
 def test_empty_voxels_count_but_not_among_the_occupied():
     ghost = {(z, 2, 20): 1.0 for z in range(4)}  # where there is no point
     result = scores(Mock(pole(5) | ghost), crop(1, 5))
-    assert result["voxel"]["precision"] == 12 / 16
-    assert result["voxel_occupied"]["precision"] == 1.0
-    assert result["towers"]["n_predicted"] == 1
+    assert result.voxel.precision == 12 / 16
+    assert result.voxel_occupied.precision == 1.0
+    assert result.towers.n_predicted == 1
 
 
 def test_a_voxel_at_tau_is_detected():
-    assert scores(Mock(pole(5, 0.3)), crop(1, 5), tau=0.3)["voxel"]["recall"] == 1.0
-    assert scores(Mock(pole(5, 0.299)), crop(1, 5), tau=0.3)["voxel"]["recall"] == 0.0
+    assert scores(Mock(pole(5, 0.3)), crop(1, 5), tau=0.3).voxel.recall == 1.0
+    assert scores(Mock(pole(5, 0.299)), crop(1, 5), tau=0.3).voxel.recall == 0.0
 
 
 def test_a_detected_pole_out_of_reach_of_every_true_one_is_a_false_tower():
     result = scores(Mock(pole(5) | pole(15)), crop(1, 5, 25))
-    assert result["towers"] == {
+    assert result.to_json()["towers"] == {
         "precision": 0.5, "recall": 0.5, "median_error_m": 0.0, "n_true": 2, "n_predicted": 2,
     }  # fmt: skip
-    [sample] = result["per_sample"]
-    assert (sample["towers_true"], sample["towers_predicted"]) == (2, 2)
+    [sample] = result.per_sample
+    assert (sample.towers_true, sample.towers_predicted) == (2, 2)
 
 
 def test_the_curve_of_all_crops_has_the_scores_at_tau():
     result = scores(Mock(pole(5, 0.8) | pole(15, 0.6)), crop(1, 5), tau=0.7)
-    curve = result["pr_curve"]
+    curve = result.pr_curve
     tau = np.array(curve["tau"])
     both, one, none = tau < 0.6, (tau > 0.61) & (tau < 0.79), tau > 0.81
     for seen, precision, recall in ((both, 0.5, 1.0), (one, 1.0, 1.0), (none, 0.0, 0.0)):
         assert seen.sum() > 10
         assert set(np.array(curve["precision"])[seen]) == {precision}
         assert set(np.array(curve["recall"])[seen]) == {recall}
-    assert (result["voxel"]["precision"], result["voxel"]["recall"]) == (1.0, 1.0)
+    assert (result.voxel.precision, result.voxel.recall) == (1.0, 1.0)
 
 
 def test_scores_are_plain_numbers():
     result = scores(Mock(pole(5)), crop(1, 5))
-    assert json.loads(json.dumps(result, allow_nan=False)) == result
+    assert json.loads(json.dumps(result.to_json(), allow_nan=False)) == result.to_json()
+    assert Evaluation.from_json(result.to_json()) == result
 
 
 def test_without_tau_there_is_no_score():
@@ -162,13 +164,13 @@ def test_only_the_part_asked_for_is_scored(chain, pole_finder, tmp_path):
         part: evaluate(tmp_path / "m.json", [chain.voxels], chain.split, LONE_POLES, part)
         for part in ("train", "validation", "test")
     }
-    assert {p: r["voxel"]["n_samples"] for p, r in found.items()} == {
+    assert {p: r.voxel.n_samples for p, r in found.items()} == {
         "train": 2, "validation": 1, "test": 3,
     }  # fmt: skip
-    assert all(result["part"] == part for part, result in found.items())
-    towers = found["test"]["towers"]
-    assert (towers["n_true"], towers["recall"], towers["precision"]) == (3, 1.0, 1.0)
-    assert towers["median_error_m"] < 1.0
+    assert all(result.part == part for part, result in found.items())
+    towers = found["test"].towers
+    assert (towers.n_true, towers.recall, towers.precision) == (3, 1.0, 1.0)
+    assert towers.median_error_m < 1.0
 
 
 def test_a_tower_that_is_found_counts_whole_and_what_is_none_does_not():
@@ -186,17 +188,17 @@ def test_a_tower_that_is_found_counts_whole_and_what_is_none_does_not():
         return volume.reshape(-1), truth
 
     def counted(**how):
-        return score_answers("m", 0, 0.5, answer, dataset, LONE_POLES, **how)
+        return score_predictions("m", 0, 0.5, answer, dataset, LONE_POLES, **how)
 
     observer, towers = counted(), counted(whole_towers=True)
-    assert observer["voxel"] == observer["voxel_observer"] == towers["voxel_observer"]
-    assert towers["voxel"] == towers["voxel_towers"] == observer["voxel_towers"]
-    assert (observer["voxel"]["recall"], observer["voxel"]["precision"]) == (6 / 12, 6 / 8)
+    assert observer.voxel == observer.voxel_observer == towers.voxel_observer
+    assert towers.voxel == towers.voxel_towers == observer.voxel_towers
+    assert (observer.voxel.recall, observer.voxel.precision) == (6 / 12, 6 / 8)
     # The voxel on the ground is no part of a body.
-    assert (towers["voxel"]["recall"], towers["voxel"]["precision"]) == (11 / 12, 1.0)
-    [sample] = towers["per_sample"]
-    assert (sample["tp"], sample["fp"], sample["fn"]) == (11, 0, 1)
-    assert sample["f05_observer"] < sample["f05_towers"] == sample["f05"]
+    assert (towers.voxel.recall, towers.voxel.precision) == (11 / 12, 1.0)
+    [sample] = towers.per_sample
+    assert (sample.tp, sample.fp, sample.fn) == (11, 0, 1)
+    assert sample.f05_observer < sample.f05_towers == sample.f05
 
 
 def test_towers_are_found_in_voxels_finer_than_the_points_are_dense():
@@ -209,10 +211,11 @@ def test_towers_are_found_in_voxels_finer_than_the_points_are_dense():
     sample = VoxelSample("c", grid, index.astype(np.int32), np.ones_like(index, np.int32), true)
     probability = np.zeros(grid.n_voxels, np.float32)
     probability[sample.index[true][3:]] = 1.0  # not its foot
-    [tower], theirs = find_in_crop(sample, probability, 0.5, LONE_POLES)
+    found = detect_in_crop(sample, probability, 0.5, LONE_POLES)
+    [tower] = found.towers
     assert (tower.x, tower.y) == pytest.approx((15.1, 6.1), abs=0.5)
     assert tower.height == pytest.approx(15.5, abs=1.0)
-    np.testing.assert_array_equal(theirs, true)
+    np.testing.assert_array_equal(found.voxels, true)
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -221,4 +224,4 @@ def test_a_model_in_metres_says_whole_towers_unless_it_is_told_not_to(whole):
         name="m", kind="scenenet", protocol="operational", metric=MetricSettings(whole_towers=whole)
     )
     result = score(new_model(settings, 0), CARD, Dataset([], [], "edp", []), LONE_POLES)
-    assert result["whole_towers"] is whole
+    assert result.whole_towers is whole

@@ -15,7 +15,7 @@ def evaluate(job: _job.Job) -> None:
         DetectionSettings(**job.settings),
         part=job.identity["part"],
     )
-    write_json(job.output.scores, scores)
+    write_json(job.output.scores, scores.to_json())
 
 
 _job.run(evaluate)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
@@ -20,18 +21,21 @@ _KINDS = get_args(settings.ModelSettings.model_fields["kind"].annotation)
 _RESOLUTIONS = get_args(voxels.VoxelSettings.model_fields["resolution"].annotation)
 
 
-def _choices(name: str, values: Any) -> Any:
-    return StrEnum(name, {value: value for value in values})
+if TYPE_CHECKING:
+    Codes = Fits = Protocols = Kinds = StrEnum
+else:
 
+    def _choices(name: str, values: Iterable[str]) -> type[StrEnum]:
+        return StrEnum(name, {value: value for value in values})
 
-Codes = _choices("Codes", SCHEMES)
-"""Class schemes (``scenenet.pointcloud.class_schemes``)."""
-Fits = _choices("Fits", get_args(voxels.Fit))
-"""Ways to lay the grid (``scenenet.dataset.voxels``)."""
-Protocols = _choices("Protocols", get_args(settings.Protocol))
-"""Training protocols (``scenenet.models.settings``)."""
-Kinds = _choices("Kinds", _KINDS)
-"""Architectures (``scenenet.models.settings``)."""
+    Codes = _choices("Codes", SCHEMES)
+    """Class schemes (``scenenet.pointcloud.class_schemes``)."""
+    Fits = _choices("Fits", get_args(voxels.Fit))
+    """Ways to lay the grid (``scenenet.dataset.voxels``)."""
+    Protocols = _choices("Protocols", get_args(settings.Protocol))
+    """Training protocols (``scenenet.models.settings``)."""
+    Kinds = _choices("Kinds", _KINDS)
+    """Architectures (``scenenet.models.settings``)."""
 
 Survey = Annotated[Path, typer.Argument(help="LAS, LAZ or COPC survey, or TS40K sample.")]
 Surveys = Annotated[

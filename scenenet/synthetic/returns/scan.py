@@ -11,6 +11,14 @@ import numpy as np
 
 from scenenet.synthetic.returns.flight import Flight
 from scenenet.synthetic.returns.pulse import CEILING_CELL_M, FOLIAGE, FOLIATED, MOST_RETURNS, STEP_M
+from scenenet.synthetic.returns.records import (
+    CoverGrids,
+    Frame,
+    Grid,
+    Returns,
+    ScanLines,
+    Scene,
+)
 from scenenet.synthetic.scene.ground_cover import Cover
 from scenenet.synthetic.scene.random_fields import Raster, field_seed
 from scenenet.synthetic.scene.strip import Strip
@@ -55,61 +63,78 @@ class Scanner:
         """
         from scenenet.synthetic.returns.sweep import sweep
 
-        settings = self._settings
+        # How far a pulse can come from across on its way down through the tallest tree.
+        tallest = np.maximum(canopy.top.values, solid.values)
+        lean = (strip.half_width + abs(flight.offset)) / flight.height
+        reach = lean * float(tallest.max())
+        scene = self._scene(
+            flight, terrain, canopy, solid, cover, _ceiling(tallest, canopy.top, reach)
+        )
+        frame = Frame(
+            strip.x, strip.y, float(np.cos(strip.azimuth)), float(np.sin(strip.azimuth)),
+            strip.low, strip.high, strip.k0, strip.k1, strip.half_width,
+        )  # fmt: skip
+        marked = np.zeros((3, *terrain.values.shape), np.bool_)
+        aside = abs(flight.skew) * strip.half_width
+        lines = int((strip.last - strip.first + 2 * aside) / flight.line_step) + 2
+        points, codes = [], []
+        for number, (start, end) in enumerate(flight.passes):
+            # Pulses that come down outside may have met a crown inside.
+            start, end = start - reach, end + reach
+            pulses = int((end - start) / flight.pulse_step) + 1
+            per_block = max(1, BLOCK_PULSES // pulses)
+            scan_lines = ScanLines(
+                strip.first - aside, start, flight.line_step, flight.pulse_step, flight.skew,
+                flight.sway, flight.offset, flight.height,
+            )  # fmt: skip
+            seed = np.uint64(field_seed(self._settings.seed, f"pulses {key} {number}"))
+            for first in range(0, lines, per_block):
+                last = min(first + per_block, lines)
+                most = (last - first) * pulses * (MOST_RETURNS + 1)
+                out = Returns(np.empty((most, 3)), np.empty(most, np.uint8), marked)
+                n = sweep(first, last, pulses, seed, frame, scan_lines, scene, out)
+                points.append(out.xyz[:n].copy())
+                codes.append(out.code[:n].copy())
+        return np.concatenate(points), np.concatenate(codes)
+
+    def _scene(
+        self,
+        flight: Flight,
+        terrain: Raster,
+        canopy: Canopy,
+        solid: Raster,
+        cover: Cover,
+        ceiling: Grid,
+    ) -> Scene:
         x, y = canopy.top.nodes()
         ground = terrain.bilinear(x.ravel(), y.ravel()).reshape(x.shape)
         top = np.where(canopy.top.values > 0, ground + canopy.top.values, -np.inf)
         bottom = ground + canopy.bottom.values
         roof = np.where(solid.values > 0, ground + solid.values, -np.inf)
-        # Side by side in memory: a pulse looks at all four of a cell.
+        # Adjacent in memory: a pulse reads all four of a cell.
         columns = np.stack(
             [top, bottom, roof, canopy.leaves.values],
             axis=-1,
             dtype=np.float32,
             casting="same_kind",
         )
-        tallest = np.maximum(canopy.top.values, solid.values)
-        # How far a pulse can come from across on its way down through the tallest tree.
-        lean = (strip.half_width + abs(flight.offset)) / flight.height
-        reach = lean * float(tallest.max())
-        ceiling, ci, cj = _ceiling(tallest, canopy.top, reach)
-        marked = np.zeros((3, *terrain.values.shape), np.bool_)
-        frame = np.array(
-            [strip.x, strip.y, np.cos(strip.azimuth), np.sin(strip.azimuth), strip.low, strip.high,
-             strip.k0, strip.k1, strip.half_width]
+        grass = cover.grass
+        return Scene(
+            ground=Grid(terrain.values, terrain.i, terrain.j, terrain.step),
+            crowns=Grid(columns, canopy.top.i, canopy.top.j, canopy.top.step),
+            ceiling=ceiling,
+            cover=CoverGrids(
+                grass.values, cover.tallness.values, cover.rise.values, cover.water.values,
+                grass.i, grass.j, grass.step,
+            ),
+            foliage=self._foliage,
+            hit=float(self._hit),
+            depths=flight.depths,
+            noise=self._settings.ranging_noise,
         )  # fmt: skip
-        points, codes = [], []
-        for number, (start, end) in enumerate(flight.passes):
-            lines = int((strip.last - strip.first + 2 * abs(flight.skew) * strip.half_width)
-                        / flight.line_step) + 2  # fmt: skip
-            # Pulses that come down outside may have met a crown inside.
-            start, end = start - reach, end + reach
-            pulses = int((end - start) / flight.pulse_step) + 1
-            per_block = max(1, BLOCK_PULSES // pulses)
-            path = np.array(
-                [strip.first - abs(flight.skew) * strip.half_width, start, flight.line_step,
-                 flight.pulse_step, flight.skew, flight.sway, flight.offset, flight.height]
-            )  # fmt: skip
-            seed = np.uint64(field_seed(settings.seed, f"pulses {key} {number}"))
-            for first in range(0, lines, per_block):
-                last = min(first + per_block, lines)
-                xyz = np.empty(((last - first) * pulses * (MOST_RETURNS + 1), 3))
-                code = np.empty(len(xyz), np.uint8)
-                n = sweep(
-                    first, last, pulses, seed, frame, path,
-                    terrain.values, terrain.i, terrain.j,
-                    columns, flight.depths, canopy.top.i, canopy.top.j, canopy.top.step,
-                    ceiling, ci, cj, self._foliage, self._hit,
-                    cover.grass.values, cover.tallness.values, cover.rise.values,
-                    cover.water.values, cover.grass.i, cover.grass.j, cover.grass.step,
-                    settings.ranging_noise, marked, xyz, code,
-                )  # fmt: skip
-                points.append(xyz[:n].copy())
-                codes.append(code[:n].copy())
-        return np.concatenate(points), np.concatenate(codes)
 
 
-def _ceiling(tallest: np.ndarray, raster: Raster, reach: float) -> tuple[np.ndarray, int, int]:
+def _ceiling(tallest: np.ndarray, raster: Raster, reach: float) -> Grid:
     """Greatest height above the ground within ``reach`` of each cell of ``CEILING_CELL_M``."""
     from scipy.ndimage import maximum_filter
 
@@ -123,4 +148,4 @@ def _ceiling(tallest: np.ndarray, raster: Raster, reach: float) -> tuple[np.ndar
     ceiling = full.reshape(rows, per, columns, per).max(axis=(1, 3))
     # Cells around: a pulse enters from the side.
     size = 2 * int(np.ceil(reach / CEILING_CELL_M)) + 1
-    return maximum_filter(ceiling, size), i0, j0
+    return Grid(maximum_filter(ceiling, size), i0, j0, CEILING_CELL_M)

@@ -1,1 +1,11 @@
-"""What every package uses: errors, files, settings, progress, provenance."""
+"""Foundations that every other package uses.
+
+- ``errors``: the one error that users see.
+- ``settings``: the base class of all settings.
+- ``files``: outputs that are written whole or not at all, JSON, digests.
+- ``progress``: progress of long work on stderr.
+- ``provenance``: fingerprints of inputs, the record of what made a result.
+- ``code_hash``: a digest of the code behind a result.
+- ``compilation``: how numba compiles the loops.
+- ``peak_memory``: memory that the process has used.
+"""

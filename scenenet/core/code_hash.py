@@ -1,7 +1,7 @@
-"""A digest of the code behind a script, which changes when its result could and not when it cannot.
+"""A digest of the code behind a script; it changes only if the result could change.
 
-Snakemake sees the date of a script and nothing of what it imports. This sees all of the package
-that a script uses, by content, and overlooks comments, docstrings and layout.
+Snakemake compares the date of a script and ignores what it imports. This digest covers everything
+in the package that a script uses, by content, and ignores comments, docstrings and layout.
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from scenenet.core.errors import InputError
 from scenenet.core.files import digest, sha256
 
 Use = tuple[str, str | None]
-"""A module and the name that is used of it; None where the module as a whole is."""
+"""A module and the name that is used from it; None if the whole module is used."""
 
 _TYPE_CHECKING = frozenset({"TYPE_CHECKING", "typing.TYPE_CHECKING"})
 _COMPILED = frozenset({".py", ".pyc", ".pyo", ".so", ".nbc", ".nbi"})
 
 
 def code_hash(entry_files: Iterable[str | Path], package: str = "scenenet") -> str:
-    """Digest of some scripts and of all code of ``package`` that they use, near or far.
+    """Digest of some scripts and of all code of ``package`` that they use, directly or indirectly.
 
-    - Imports inside functions count as those at the top; those under ``if TYPE_CHECKING`` never
-      run and do not. A script also counts the scripts beside it that it imports.
-    - Of a module the syntax tree counts, without docstrings.
-    - An ``__init__`` that does nothing but import names from elsewhere is looked through: who
-      imports one of its names uses the module which that name is from, and not all the others.
-    - The files of a package that are not code, such as templates, count with each of its modules.
-    - A module that finds its neighbours with ``pkgutil`` counts all code in its folder and below.
+    - Imports inside functions count like those at the top; those under ``if TYPE_CHECKING`` do
+      not, because they never run. Scripts in the same folder that a script imports count too.
+    - A module counts by its syntax tree, without docstrings.
+    - An ``__init__`` that only imports names is transparent: code that imports one of its names
+      uses the module that the name comes from, and not the others.
+    - The files of a package that are not code, such as templates, count for each of its modules.
+    - A module that finds others with ``pkgutil`` counts all code in its folder and below.
     - Other libraries do not count.
 
     Raises:
@@ -43,7 +43,7 @@ def code_hash(entry_files: Iterable[str | Path], package: str = "scenenet") -> s
 
 
 def used_code(entry_files: Iterable[str | Path], package: str = "scenenet") -> set[tuple[str, str]]:
-    """(name, digest) of every script, module and data file that ``code_hash`` is made from."""
+    """(name, digest) of every script, module and data file that ``code_hash`` covers."""
     used: set[tuple[str, str]] = set()
     waiting: list[Use] = []
     for file in _scripts(entry_files, package):
@@ -63,25 +63,25 @@ def used_code(entry_files: Iterable[str | Path], package: str = "scenenet") -> s
 
 
 def _scripts(entry_files: Iterable[str | Path], package: str) -> set[Path]:
-    """The entry files and the scripts beside them that they import."""
+    """The entry files and the scripts in their folders that they import."""
     found: set[Path] = set()
     waiting = [Path(entry).resolve() for entry in entry_files]
     while waiting:
         file = waiting.pop()
         if file not in found:
             found.add(file)
-            waiting += _read(file, None, package).beside
+            waiting += _read(file, None, package).neighbours
     return found
 
 
 def _resolve(use: Use, package: str) -> tuple[set[tuple[str, str]], list[Use]]:
-    """What using a name of a module adds, and what it uses in turn."""
+    """(name, digest) of what the use of a name adds, and what this uses in turn."""
     module, name = use
     file = _locate(module)
     if file is None:
         return set(), []
     source = _read(file, module, package)
-    # Importing a.b.c runs a and a.b first, which matters where they do more than hand names on.
+    # Importing a.b.c runs a and a.b first, which matters if they do more than import names.
     parent = module.rpartition(".")[0]
     more: list[Use] = []
     if parent and not _source_of(parent, package).only_imports:
@@ -103,18 +103,18 @@ class _Source:
     """One file of Python.
 
     Attributes:
-        digest: of what it does.
+        digest: of its syntax tree without docstrings.
         uses: what it imports of the package.
         only_imports: whether it is an ``__init__`` that only imports names.
-        exports: name -> where it is from, in such an ``__init__``.
-        beside: scripts in the folder of a script that it imports.
+        exports: name -> where it comes from, in such an ``__init__``.
+        neighbours: for a script, the scripts in its folder that it imports.
     """
 
     digest: str
     uses: tuple[Use, ...]
     only_imports: bool = False
     exports: dict[str, Use] = field(default_factory=dict)
-    beside: tuple[Path, ...] = ()
+    neighbours: tuple[Path, ...] = ()
 
 
 def _source_of(module: str, package: str) -> _Source:
@@ -124,7 +124,7 @@ def _source_of(module: str, package: str) -> _Source:
 
 @cache
 def _locate(name: str) -> Path | None:
-    """File of a module, found without running any of its package but the topmost."""
+    """File of a module, found by importing only the top-level package."""
     top, _, rest = name.partition(".")
     spec = find_spec(top)
     if spec is None or spec.origin is None:
@@ -141,7 +141,7 @@ def _locate(name: str) -> Path | None:
 def _read(file: Path, name: str | None, package: str) -> _Source:
     """A file; ``name`` is None for a script outside the package.
 
-    Cached: a process sees one state of the code, as it does when it imports it.
+    Cached: a process works with one state of the code, as it does for its imports.
     """
     try:
         tree = ast.parse(file.read_bytes(), filename=str(file))
@@ -149,7 +149,9 @@ def _read(file: Path, name: str | None, package: str) -> _Source:
         raise InputError(f"cannot be read ({error.strerror})", file=file) from None
     except SyntaxError as error:
         place = f"line {error.lineno}"
-        raise InputError(f"is not Python ({error.msg})", file=file, place=place) from None
+        raise InputError(
+            f"the file is not valid Python ({error.msg})", file=file, place=place
+        ) from None
     is_package = file.name == "__init__.py"
     inside = name if is_package else (name or "").rpartition(".")[0]
     imports = list(_imports(tree, inside or ""))
@@ -158,13 +160,13 @@ def _read(file: Path, name: str | None, package: str) -> _Source:
     if name is not None and "pkgutil" in {module.partition(".")[0] for module in tops}:
         uses |= _all_modules(file.parent, inside or "")
     _strip_docstrings(tree)
-    beside = [file.with_name(f"{module}.py") for module in sorted(tops)] if name is None else []
+    neighbours = [file.with_name(f"{module}.py") for module in sorted(tops)] if name is None else []
     return _Source(
         hashlib.sha256(ast.unparse(tree).encode()).hexdigest(),
         tuple(sorted(uses, key=str)),
         is_package and all(_is_import(statement) for statement in tree.body),
         {bound: (module, used) for bound, module, used in imports if _within(module, package)},
-        tuple(script for script in beside if script.is_file()),
+        tuple(script for script in neighbours if script.is_file()),
     )
 
 
@@ -173,9 +175,9 @@ def _within(module: str, package: str) -> bool:
 
 
 def _imports(tree: ast.AST, inside: str) -> Iterator[tuple[str, str, str | None]]:
-    """(name it is bound to, module, name in the module) of every import that may run.
+    """(bound name, module, name in the module) of every import that may run.
 
-    ``inside`` is the package that relative names are relative to.
+    ``inside`` is the package that relative imports start from.
     """
     for node in _executed(tree):
         if isinstance(node, ast.Import):
@@ -184,7 +186,7 @@ def _imports(tree: ast.AST, inside: str) -> Iterator[tuple[str, str, str | None]
         elif isinstance(node, ast.ImportFrom):
             source = "." * node.level + (node.module or "")
             if node.level and not inside:
-                continue  # a script has no package; Python would refuse it as well
+                continue  # a script has no package; Python would refuse this import too
             module = resolve_name(source, inside) if node.level else source
             for alias in node.names:
                 used = None if alias.name == "*" else alias.name
@@ -192,7 +194,7 @@ def _imports(tree: ast.AST, inside: str) -> Iterator[tuple[str, str, str | None]
 
 
 def _executed(node: ast.AST) -> Iterator[ast.AST]:
-    """All statements below ``node`` but the bodies of ``if TYPE_CHECKING``."""
+    """All statements below ``node`` except the bodies of ``if TYPE_CHECKING``."""
     for child in _statements(node):
         if isinstance(child, ast.If) and ast.unparse(child.test) in _TYPE_CHECKING:
             for statement in child.orelse:
@@ -222,7 +224,7 @@ def _is_import(statement: ast.stmt) -> bool:
 
 
 def _strip_docstrings(tree: ast.Module) -> None:
-    """Take out texts that stand alone as a statement: docstrings of modules, classes, functions
+    """Remove strings that are statements of their own: docstrings of modules, classes, functions
     and attributes."""
     waiting: list[ast.AST] = [tree]
     while waiting:
@@ -231,7 +233,7 @@ def _strip_docstrings(tree: ast.Module) -> None:
             statements = getattr(node, part, None)
             if isinstance(statements, list):
                 kept = [s for s in statements if not _is_text(s)]
-                # The body of a function must hold something; other parts need not.
+                # The body of a function must not be empty; other parts may be.
                 empty = [ast.Pass()] if statements and part == "body" else []
                 setattr(node, part, kept or empty)
         waiting += _statements(node)
@@ -253,7 +255,8 @@ def _all_modules(folder: Path, name: str) -> set[Use]:
 
 @cache
 def _data_files(folder: Path) -> tuple[Path, ...]:
-    """Files of a package that are not code: its own and those of folders that are no packages."""
+    """Files of a package that are not code: its own, and those of subfolders without Python
+    files."""
     found: list[Path] = []
     for path in sorted(folder.iterdir()):
         if path.name.startswith((".", "__pycache__")):

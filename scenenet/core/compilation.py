@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 COMPILED: dict[str, Any] = {
-    # Machine code is kept beside the source, so that only the first run waits for the compiler.
+    # Machine code is cached on disk, so that only the first run waits for the compiler.
     "cache": True,
-    # A division gives infinity instead of an exception, without which no loop around one can use
+    # A division by zero gives infinity instead of an exception; a loop that may raise cannot use
     # vector registers.
     "error_model": "numpy",
-    # A product and a sum may be one instruction. Sums keep their order: same numbers, same answer.
+    # A product and a sum may become one instruction. Sums keep their order, so the same input
+    # gives the same result.
     "fastmath": {"contract"},
 }

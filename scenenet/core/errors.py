@@ -1,4 +1,4 @@
-"""What went wrong, where, and what to do about it: the one error users of the package see."""
+"""The one error that users of the package see: what went wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from pathlib import Path
 class InputError(ValueError):
     """The input is at fault (a file, a table, a setting), not the program.
 
-    The message always reads ``FILE: PLACE: PROBLEM. REMEDY`` with the parts that are known, so that
-    a log line alone is enough to act on. The command line turns it into exit code 1.
+    The message always reads ``FILE: PLACE: PROBLEM. REMEDY``, without the parts that are unknown,
+    so that one line of a log is enough to act on. The command line turns it into exit code 1.
 
     Args:
         problem: what is wrong, as a sentence without a full stop.
         file: the file at fault.
-        place: where in the file (a row, a byte, a key), if it can be told.
+        place: where in the file (a row, a byte, a key), if known.
         remedy: what the user can do, as a sentence without a full stop.
     """
 

@@ -1,4 +1,4 @@
-"""Outputs that appear whole or not at all, and digests of files."""
+"""Outputs that are written whole or not at all, JSON files, and digests."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from typing import Any
 
 @contextlib.contextmanager
 def atomic(path: str | Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` that is renamed to it when the block ends without an error.
+    """A temporary path that is renamed to ``path`` when the block ends without an error.
 
     A reader never sees half a file, and Ctrl-C leaves neither the file nor the temporary one. The
-    temporary name keeps the suffix, because libraries choose a format by it. Works for files and
-    for directories (an existing directory is replaced).
+    temporary path is in the same folder and keeps the suffix, because libraries choose a format by
+    it. Works for files and for directories (an existing directory is replaced).
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -34,16 +34,18 @@ def atomic(path: str | Path) -> Iterator[Path]:
 
 
 def write_text(path: str | Path, text: str) -> None:
+    """Write ``text`` as UTF-8, whole or not at all."""
     with atomic(path) as partial:
         partial.write_text(text, encoding="utf-8")
 
 
 def write_json(path: str | Path, data: Any) -> None:
-    """Write ``data`` as indented JSON; NaN is refused, because JSON has none."""
+    """Write ``data`` as indented JSON; NaN raises a ValueError, because JSON has none."""
     write_text(path, json.dumps(data, indent=2, allow_nan=False) + "\n")
 
 
 def read_json(path: str | Path) -> Any:
+    """The content of a JSON file."""
     return json.loads(Path(path).read_text(encoding="utf-8"))
 
 
@@ -54,6 +56,6 @@ def sha256(path: str | Path) -> str:
 
 
 def digest(data: Any) -> str:
-    """A short, stable digest of plain data (dicts in any order give the same one)."""
+    """A short, stable digest of plain data; the order of dictionary keys does not matter."""
     canonical = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.sha256(canonical.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""How much memory a process has had."""
+"""How much memory a process has used."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Any
 
 
 def used() -> dict[str, Any]:
-    """What this process has used so far: ``peak_memory_mb``, the largest resident set it ever had,
-    libraries included, MB of 10^6 bytes; None on systems that do not say."""
+    """``peak_memory_mb``: the largest resident set of this process so far, libraries included, MB
+    of 10^6 bytes; None on systems that do not report it."""
     try:
         import resource
     except ImportError:  # Windows

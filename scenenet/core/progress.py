@@ -1,4 +1,4 @@
-"""Progress of long work, on stderr: a bar on a terminal, a line now and then in a log."""
+"""Progress of long work, on stderr: a bar on a terminal, a line every few seconds in a log."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import TypeVar
 Item = TypeVar("Item")
 
 LOG_INTERVAL_S = 5.0
-"""Seconds between two lines where stderr is a file, so that a log stays readable."""
+"""Seconds between two lines if stderr is a file, so that a log stays readable."""
 
 
 def track(items: Iterable[Item], label: str, total: int | None = None) -> Iterator[Item]:
-    """Yield ``items`` and report on stderr how far it is.
+    """Yield ``items`` and report progress on stderr.
 
     Args:
-        items: what to go through.
-        label: what is being done.
-        total: number of items, where ``len(items)`` does not tell.
+        items: what to iterate over.
+        label: text before the count.
+        total: number of items; needed only if ``items`` has no length.
     """
     if total is None and isinstance(items, Sized):
         total = len(items)

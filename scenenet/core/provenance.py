@@ -1,4 +1,4 @@
-"""What made a result: fingerprints of its inputs, and the record beside it."""
+"""What made a result: fingerprints of its inputs, and the record that is written with it."""
 
 from __future__ import annotations
 
@@ -11,27 +11,28 @@ from scenenet.core.errors import InputError
 from scenenet.core.files import digest, sha256, write_text
 
 FULL_BELOW_BYTES = 64 * 1024**2
-"""Files from this size on are known by size and time, because reading them takes seconds."""
+"""Files of this size or more are identified by size and time, because reading them takes
+seconds."""
 
 SAMPLE_SUFFIXES = frozenset({".las", ".laz", ".npy", ".pt"})
-"""The files that count in a folder of samples."""
+"""Suffixes of the files that count in a folder of samples."""
 
 
 def fingerprint(path: str | Path, full_below_bytes: int = FULL_BELOW_BYTES) -> str:
-    """A short text that is another one when the file is another one.
+    """A short text that differs if the file differs.
 
     Args:
         path: a file, or a folder of samples.
-        full_below_bytes: up to this size the content counts, so that touching a file changes
-            nothing; from there on size and modification time (ns), older times included.
+        full_below_bytes: below this size the content counts, so that touching a file changes
+            nothing; from this size on, size and modification time (ns) count.
 
     Returns:
-        ``sha256:...`` or ``size-mtime:BYTES-NANOSECONDS``; for a folder ``folder:COUNT-...`` over
-        the names and fingerprints of its samples, whose sizes are added up to decide how each is
-        known. Folders inside of it do not count.
+        ``sha256:...`` or ``size-mtime:BYTES-NANOSECONDS``; for a folder ``folder:COUNT-...``
+        over the names and fingerprints of its samples; their total size decides whether content
+        or size and time count. Subfolders do not count.
 
     Raises:
-        InputError: there is no such file.
+        InputError: the file cannot be read.
     """
     path = Path(path)
     try:
@@ -57,15 +58,16 @@ def record(
     config: str,
     seed: int | None = None,
 ) -> dict[str, Any]:
-    """What a result was made from and by.
+    """What made a result: the content of ``provenance.json``.
 
     Args:
         stage: name of the stage.
-        settings: what the stage was set to.
-        inputs: name of each input -> its fingerprint (or several, where an input is a list).
+        settings: of the stage.
+        inputs: name of each input -> its fingerprint (a list of them for an input of several
+            files).
         code: ``scenenet.core.code_hash.code_hash`` of what computed it.
         config: digest of the settings.
-        seed: of the random numbers, where the stage draws any.
+        seed: of the random numbers; None if the stage draws none.
     """
     made_by = {
         "stage": stage,
@@ -79,7 +81,7 @@ def record(
 
 
 def package_version() -> str:
-    """Version of the installed package; ``unknown`` where it runs from a bare folder."""
+    """Version of the installed package; ``unknown`` if it is not installed."""
     try:
         return version("scenenet")
     except PackageNotFoundError:
@@ -87,7 +89,7 @@ def package_version() -> str:
 
 
 def write_settings(path: str | Path, settings: Mapping[str, Any]) -> None:
-    """Write settings as YAML that can be given to the workflow again as its configuration."""
+    """Write settings as YAML that the workflow accepts as its configuration."""
     import yaml
 
     head = f"# All settings of a run, defaults included. Digest: {digest(dict(settings))}\n"

@@ -1,4 +1,4 @@
-"""The base of every settings model."""
+"""The base class of all settings."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
-"""What a survey may be called: its name becomes a folder."""
+"""Pattern of the name of a survey, which becomes the name of a folder."""
 
 
 class Settings(BaseModel):
-    """Settings of one stage: typed, bounded, frozen; an unknown name is refused, not ignored.
+    """Settings of one stage: typed, bounded, frozen; an unknown name is an error.
 
-    A default is written once, in the model that stands beside the stage it sets.
+    Each default is written once, in the settings class next to the stage that uses it.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -24,10 +24,13 @@ S = TypeVar("S", bound=Settings)
 
 
 def changed(settings: S, changes: Mapping[str, Any]) -> S:
-    """``settings`` with dotted ``changes``, checked anew.
+    """A copy of ``settings`` with ``changes``, validated.
+
+    Args:
+        changes: dotted name of a setting -> its new value.
 
     Raises:
-        ValidationError: a change names no setting, or is none that it can be.
+        ValidationError: a name is not a setting, or a value is not allowed for it.
     """
     raw = settings.model_dump()
     for dotted, value in changes.items():

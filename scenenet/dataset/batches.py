@@ -1,4 +1,4 @@
-"""Crops on their grids, gathered into batches a model can take."""
+"""Voxel samples combined into batches for a model."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from scenenet.dataset.voxels import Measurement, VoxelSample
 
 
 def batch(samples: Sequence[VoxelSample], measurement: Measurement) -> tuple[Occupancy, np.ndarray]:
-    """Samples as one batch on the smallest shape that holds them all.
+    """Samples as one batch, on the smallest shape that contains all their grids.
 
-    Smaller grids (fit metric) are widened on the high side with empty voxels.
+    Smaller grids (fit metric) are padded with empty voxels at the upper end of each axis.
 
     Returns:
         the batch, and (T,) int64 flat positions of the tower voxels in a (B, D, H, W) volume.

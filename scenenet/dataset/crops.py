@@ -1,4 +1,4 @@
-"""The ancillary dataset: the surroundings of each tower (thesis 5.1.3, Figure 5.3)."""
+"""Crops: the surroundings of each tower (the ancillary dataset, thesis 5.1.3, Figure 5.3)."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _RECORD = np.dtype([("xyz", "<f8", 3), ("classification", "u1")])
 
 
 class CropSettings(Settings):
-    """How much of the surroundings a crop takes."""
+    """Size of a crop."""
 
     radius_in_heights: float = Field(
         1.0, gt=0, description="planar radius of a crop, in heights of its tower (thesis: 1)"
@@ -39,7 +39,7 @@ class Crop:
         id: unique name, SURVEY-NUMBER or SURVEY-SAMPLE.
         x, y: centre of its tower, m.
         radius: planar radius, m.
-        towers: (T, 2) centres of all true towers in the crop, m.
+        towers: (T, 2) x and y of the centres of all labelled towers in the crop, m.
     """
 
     id: str
@@ -60,16 +60,21 @@ def cut_crops(
 ) -> dict[str, Any]:
     """Write every point within one tower height (planar) of each tower.
 
-    The survey is read once, chunk by chunk, and the crops grow on disk, so memory is bounded by a
-    chunk and a crop. TS40K samples are crops already and are taken as they are.
+    The survey is read once, chunk by chunk, and crops are collected on disk, so that memory is
+    bounded by one chunk and one crop. TS40K samples are crops already and are copied unchanged.
 
     Args:
         survey: name of the survey, the first part of each crop's id.
-        towers: table of ``scenenet.dataset.labelled_towers``.
+        path: the survey, a TS40K sample, or a folder of samples.
+        codes: class scheme of its labels.
+        towers: table of ``labelled_towers.survey_towers``.
+        settings: size of a crop.
+        store: path of the ``.zarr.zip`` file to write.
+        manifest: path of the JSON file to write, in the same folder.
 
     Returns:
-        the manifest: ``crops`` has an entry for each; ``skipped`` says which samples were left
-        out, and why.
+        the manifest: ``crops`` has an entry for each crop; ``skipped`` lists the samples that were
+        left out, with the reason.
     """
     facts: dict[str, Any] = {"survey": survey, "codes": codes, "crops": [], "skipped": []}
     samples = sample_files(path)
@@ -86,7 +91,7 @@ def cut_crops(
 
 
 def read_crops(manifest: str | Path) -> Iterator[tuple[Crop, PointCloud]]:
-    """The crops of a store, one at a time; the CRS stays with the survey."""
+    """The crops of a store, one at a time, without the CRS of the survey."""
     reader = StoreReader(manifest)
     scheme = class_scheme(reader.manifest["codes"])
     for entry in reader.manifest["crops"]:
@@ -137,9 +142,9 @@ def _cut(
 
 
 def _append(spool: Path, chunk: PointCloud, centre: np.ndarray, radius: float) -> None:
-    """Add the points of ``chunk`` within the crop to its file."""
+    """Append the points of ``chunk`` within the crop to its file."""
     offset = chunk.xyz[:, :2] - centre
-    # The square first: most chunks are far away, and two comparisons rule them out.
+    # The bounding square first: two comparisons exclude most chunks, which are far away.
     near = np.flatnonzero((np.abs(offset) <= radius).all(axis=1))
     near = near[(offset[near] ** 2).sum(axis=1) <= radius**2]
     if len(near) == 0:
@@ -163,7 +168,7 @@ def _samples(
         cloud = read(sample, codes)
         found = towers[towers["sample"] == sample.stem]
         if len(found) == 0:
-            skipped.append({"sample": sample.name, "reason": "no tower found in it"})
+            skipped.append({"sample": sample.name, "reason": "it has no labelled tower"})
             continue
         main = found.loc[found["points"].idxmax()]
         radius = float(main["height"]) * settings.radius_in_heights

@@ -1,4 +1,4 @@
-"""Fixed folds of crops, so that every crop is left out once."""
+"""Folds for cross-validation: every crop is left out once."""
 
 from __future__ import annotations
 
@@ -13,28 +13,28 @@ from scenenet.dataset.crops import Crop
 
 @dataclass(frozen=True)
 class Fold:
-    """Positions of crops in the list the fold was made from.
+    """One fold: positions of crops in the list that it was made from.
 
     Attributes:
-        out: left out, and scored.
-        learnt: trained on.
-        beside: neighbours of those left out, in no part.
+        out: crops that are left out of training and scored.
+        train: crops to train on.
+        excluded: neighbours of the crops left out; neither trained on nor scored.
     """
 
     out: list[int]
-    learnt: list[int]
-    beside: list[int]
+    train: list[int]
+    excluded: list[int]
 
 
 def folds(crops: Sequence[Crop], leave_out: int, neighbour: float) -> list[Fold]:
-    """Leave ``leave_out`` crops out at a time, in the order of their ids; the last fold may have
+    """Leave out ``leave_out`` crops at a time, in the order of their ids; the last fold may have
     fewer.
 
-    A crop that shares ground with one left out, or is nearer to it than ``neighbour`` (m, between
-    towers), sees the same surroundings, so it is not trained on either.
+    A crop that overlaps one left out, or whose tower is nearer to its tower than ``neighbour`` (m),
+    shows the same surroundings, so it is excluded from training.
 
     Raises:
-        InputError: there are not two crops to train on in every fold.
+        InputError: a fold has fewer than two crops to train on.
     """
     order = sorted(range(len(crops)), key=lambda i: crops[i].id)
     xy = np.array([(crop.x, crop.y) for crop in crops], float).reshape(-1, 2)
@@ -45,13 +45,14 @@ def folds(crops: Sequence[Crop], leave_out: int, neighbour: float) -> list[Fold]
         apart = np.linalg.norm(xy[:, None] - xy[None, out], axis=2)
         near = (apart < np.maximum(neighbour, radius[:, None] + radius[None, out])).any(axis=1)
         others = [i for i in order if i not in out]
-        learnt = [i for i in others if not near[i]]
-        if len(learnt) < 2:
+        train = [i for i in others if not near[i]]
+        if len(train) < 2:
             names = ", ".join(crops[i].id for i in out)
             raise InputError(
-                f"with {names} left out, {len(learnt)} of {len(crops)} crops can be trained on; "
-                f"{len(others) - len(learnt)} are their neighbours",
+                f"with {names} left out, only {len(train)} of {len(crops)} crops remain for "
+                "training; "
+                f"{len(others) - len(train)} are excluded as neighbours",
                 remedy="Add crops, or set cross_validation.leave_out or split.neighbour lower",
             )
-        made.append(Fold(out, learnt, [i for i in others if near[i]]))
+        made.append(Fold(out, train, [i for i in others if near[i]]))
     return made

@@ -1,4 +1,4 @@
-"""Tower instances in labelled points, and what they measure (thesis 5.1.2, Figure 5.2)."""
+"""Towers in labelled points: instances and their measures (thesis 5.1.2, Figure 5.2)."""
 
 from __future__ import annotations
 
@@ -15,27 +15,33 @@ from scenenet.pointcloud.ts40k import sample_files
 COLUMNS = ("tower", "x", "y", "base", "top", "height", "width", "length", "points", "spacing")
 """tower: number from 1, along the line. x, y: centre, m. base, top: elevations, m. height: top
 minus base. width, length: sides of the base, m, width <= length. points: labelled points. spacing:
-m to the next tower along the line, NaN behind the last."""
+m to the next tower along the line, NaN for the last."""
 
 
 class TowerSettings(Settings):
-    """DBSCAN over the points labelled tower."""
+    """DBSCAN of the points labelled tower."""
 
-    eps: float = Field(10.0, gt=0, description="m, points nearer than this belong together")
-    min_points: int = Field(300, ge=1, description="points a tower must have within eps")
+    eps: float = Field(
+        10.0, gt=0, description="largest distance between neighbouring points of a tower, m"
+    )
+    min_points: int = Field(
+        300, ge=1, description="points that a core point of a tower must have within eps"
+    )
     cell: float = Field(
-        1.0, gt=0, description="m, points are thinned to cells of this size, weighted by count"
+        1.0,
+        gt=0,
+        description="points are merged into cells of this size, weighted by their number, m",
     )
 
 
 def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> pd.DataFrame:
     """Towers of a labelled survey, of one TS40K sample, or of a folder of TS40K samples.
 
-    Only points labelled tower are held in memory.
+    Only points labelled tower are kept in memory.
 
     Returns:
         a row per tower with ``COLUMNS``; TS40K samples add ``sample``, the name of the sample, and
-        have no spacing, because they are single crops.
+        have spacing NaN, because they are single crops.
     """
     samples = sample_files(path)
     if not samples:
@@ -51,10 +57,10 @@ def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> pd.D
 
 
 def find_towers(xyz: np.ndarray, settings: TowerSettings) -> pd.DataFrame:
-    """Group the points of towers (N, 3) into instances and measure each.
+    """Group tower points (N, 3), xyz in m, into instances and measure each.
 
     Returns:
-        a row per tower with ``COLUMNS``, in the order of the line.
+        a row per tower with ``COLUMNS``, in order along the line.
     """
     labels = cluster(xyz, settings)
     rows = [_measure(xyz[labels == label]) for label in range(labels.max(initial=-1) + 1)]
@@ -72,8 +78,8 @@ def find_towers(xyz: np.ndarray, settings: TowerSettings) -> pd.DataFrame:
 def cluster(xyz: np.ndarray, settings: TowerSettings) -> np.ndarray:
     """DBSCAN instance of each point (N, 3): (N,) int from 0, -1 for noise.
 
-    DBSCAN's memory grows with the square of the points a tower has, so it is given one weighted
-    point a cell; the clusters are the same (docs/development/architecture.md).
+    The memory of DBSCAN grows with the square of the points of a tower, so it gets one weighted
+    point per cell; the clusters are the same (docs/development/architecture.md).
     """
     if len(xyz) == 0:
         return np.empty(0, int)
@@ -90,7 +96,8 @@ def cluster(xyz: np.ndarray, settings: TowerSettings) -> np.ndarray:
 
 
 def line_order(xy: np.ndarray) -> np.ndarray:
-    """Order of towers (T, 2) along their line: from one end, always on to the nearest one left."""
+    """Order (T,) of towers (T, 2), xy in m, along their line: from one end, always to the nearest
+    tower that is left."""
     if len(xy) < 3:
         return np.arange(len(xy))
     centred = xy - xy.mean(axis=0)
@@ -106,7 +113,7 @@ def line_order(xy: np.ndarray) -> np.ndarray:
 def _measure(xyz: np.ndarray) -> dict[str, float | int]:
     """Attributes of one tower from its points (n, 3)."""
     base, top = xyz[:, 2].min(), xyz[:, 2].max()
-    # Cells, not points: the side that the scanner saw more often must not pull the centre over.
+    # Cells, not points: the side with more points must not shift the centre.
     cells = np.unique(np.floor(xyz[:, :2] * 2), axis=0) / 2 + 0.25
     x, y = np.median(cells, axis=0)
     lower = xyz[xyz[:, 2] <= (base + top) / 2, :2]

@@ -1,4 +1,4 @@
-"""Training, validation and test parts, by stretch of line (thesis 5.2.1)."""
+"""Split into training, validation and test parts, by stretch of line (thesis 5.2.1)."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from scenenet.dataset.labelled_towers import line_order
 
 PARTS = ("train", "validation", "test")
 GUARD = "guard"
-"""Part of a crop that is left out because its two neighbours lie in different parts."""
+"""Part of a crop that is left out because its neighbours are in different parts."""
 
 
 class SplitSettings(Settings):
-    """Shares of the crops, and what counts as neighbouring."""
+    """Shares of the parts, and which crops are neighbours."""
 
     train: float = Field(0.2, gt=0, le=1, description="share of the crops to train on")
-    validation: float = Field(0.1, ge=0, lt=1, description="share to tune on")
-    test: float = Field(0.7, ge=0, lt=1, description="share to test on")
+    validation: float = Field(0.1, ge=0, lt=1, description="share of the crops to tune on")
+    test: float = Field(0.7, ge=0, lt=1, description="share of the crops to test on")
     stretch: int = Field(4, ge=1, description="consecutive towers that stay together")
     neighbour: float = Field(
         500.0,
         ge=0,
-        description="m, consecutive towers nearer than this see the same surroundings and never "
-        "fall on different sides (thesis 5.1.2: towers stand up to 500 m apart)",
+        description="consecutive towers nearer than this have the same surroundings and are never "
+        "in different parts, m (thesis 5.1.2: towers are up to 500 m apart)",
     )
-    seed: int = Field(0, ge=0, description="seed of the draw")
+    seed: int = Field(0, ge=0, description="seed of the random split")
 
     @model_validator(mode="after")
     def _shares_are_all(self) -> SplitSettings:
@@ -41,17 +41,17 @@ class SplitSettings(Settings):
         return self
 
     def parts(self) -> list[str]:
-        """The parts that get a share."""
+        """The parts with a share above 0."""
         return [part for part in PARTS if getattr(self, part) > 0]
 
 
 def split_crops(manifests: Sequence[str | Path], settings: SplitSettings) -> pd.DataFrame:
     """Assign every crop of the surveys to a part.
 
-    Each line is cut into stretches of consecutive towers, and whole stretches are drawn. Where two
-    stretches of one line meet and fall into different parts, the last crop before the border is
-    set aside as ``guard``, so that no crop has a neighbour on another side. Two crops that share
-    ground always stay together.
+    Each line is cut into stretches of consecutive towers, and whole stretches are assigned at
+    random. Where adjacent stretches of a line are in different parts, one crop at the border is
+    left out as ``guard``, so that no crop has a neighbour in another part. Crops that overlap are
+    always in the same part.
 
     Args:
         manifests: of the crop stores.
@@ -60,7 +60,7 @@ def split_crops(manifests: Sequence[str | Path], settings: SplitSettings) -> pd.
         a row per crop: survey, crop, stretch, part (train, validation, test or guard), x, y, m.
 
     Raises:
-        InputError: there are too few crops to have all three parts.
+        InputError: there are too few crops for all parts.
     """
     tables = [_stretches(path, settings) for path in manifests]
     table = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame()
@@ -75,7 +75,7 @@ def split_crops(manifests: Sequence[str | Path], settings: SplitSettings) -> pd.
     missing = [part for part in wanted if part not in set(table["part"])]
     if missing:
         raise InputError(
-            f"no crop is left for {', '.join(missing)} among {len(table)} crops in "
+            f"no crop remains for {', '.join(missing)} out of {len(table)} crops in "
             f"{table['stretch'].nunique()} stretches of line",
             remedy="Add surveys, or set split.stretch or split.neighbour lower",
         )
@@ -89,8 +89,8 @@ def crops_in(split: str | Path, part: str) -> set[str]:
 
 
 def _stretches(manifest: str | Path, settings: SplitSettings) -> pd.DataFrame:
-    """Crops of one survey along its line, with the name of the stretch, and whether the one before
-    is its neighbour."""
+    """Crops of one survey along its line, with the name of the stretch, and whether the previous
+    crop is a neighbour."""
     facts = read_json(manifest)
     crops = pd.DataFrame(facts["crops"], columns=["id", "x", "y", "radius"])
     crops = crops.iloc[line_order(crops[["x", "y"]].to_numpy(float))].reset_index(drop=True)
@@ -119,10 +119,10 @@ def _stretches(manifest: str | Path, settings: SplitSettings) -> pd.DataFrame:
 
 
 def _sharing_ground(stretch: np.ndarray, xy: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Numbers of the stretches (C,) from 0, where those with overlapping crops have become one.
+    """Numbers of the stretches (C,) from 0, after stretches with overlapping crops were merged.
 
-    A line may come back to where it has been, and lines may cross, so towers that are not
-    consecutive can share ground.
+    A line may return to the same place, and lines may cross, so towers that are not consecutive
+    can have overlapping crops.
     """
     if len(stretch) == 0:
         return stretch
@@ -140,7 +140,8 @@ def _sharing_ground(stretch: np.ndarray, xy: np.ndarray, radius: np.ndarray) -> 
 
 
 def _draw(stretch: pd.Series, settings: SplitSettings) -> dict[str, str]:
-    """Part of each stretch: in random order, each to the part that lacks the largest share."""
+    """Part of each stretch: in random order, each goes to the part that is furthest from its
+    share."""
     sizes = stretch.value_counts(sort=False)
     order = np.random.default_rng(settings.seed).permutation(len(sizes))
     wanted = {part: getattr(settings, part) * len(stretch) for part in settings.parts()}
@@ -155,7 +156,7 @@ def _draw(stretch: pd.Series, settings: SplitSettings) -> dict[str, str]:
 
 
 def _guards(table: pd.DataFrame) -> np.ndarray:
-    """Positions of the crops to set aside: at each border the one whose part has more crops."""
+    """Positions of the crops to leave out: at each border the one whose part has more crops."""
     size = table["part"].value_counts()
     guards = []
     for i in np.flatnonzero(table["beside_previous"]):

@@ -1,4 +1,4 @@
-"""The voxel cache: the grids of a survey's crops, computed once (thesis 5.1.4)."""
+"""The voxel cache: the voxel samples of a survey's crops, computed once (thesis 5.1.4)."""
 
 from __future__ import annotations
 
@@ -22,10 +22,13 @@ def build(
 
     Args:
         crops: manifest of the survey's crops.
+        settings: the grid.
+        store: path of the ``.zarr.zip`` file to write.
+        manifest: path of the JSON file to write, in the same folder.
 
     Returns:
-        the manifest: an entry a crop with its grid, the number of occupied and tower voxels and
-        the seconds that it took.
+        the manifest: ``samples`` has an entry for each crop with its grid, the numbers of occupied
+        and tower voxels, and the time that voxelisation took, s.
     """
     reader = StoreReader(crops)
     facts: dict[str, Any] = {
@@ -64,7 +67,7 @@ class Dataset:
     Attributes:
         samples, crops: of the same length, in the same order.
         codes: class scheme of the labels; several are joined by ``+``.
-        content: digests of the stores the samples came from.
+        content: digests of the stores that the samples came from.
     """
 
     samples: list[VoxelSample]
@@ -74,10 +77,10 @@ class Dataset:
 
 
 def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Dataset:
-    """Read samples back; all of them, or those with ``ids``.
+    """Read the samples of some stores: all of them, or those with ``ids``.
 
     Raises:
-        InputError: a store does not match its manifest, or a crop with one of ``ids`` is in none.
+        InputError: a store does not match its manifest, or no store has a crop of ``ids``.
     """
     samples, crops, contents, codes = [], [], [], set()
     for path in manifests:

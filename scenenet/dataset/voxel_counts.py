@@ -1,4 +1,4 @@
-"""Points counted into voxels."""
+"""Compiled loops that count points in voxels."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from scenenet.core.compilation import COMPILED
 
 @numba.njit(**(COMPILED | {"fastmath": {"nnan", "nsz"}}))
 def extremes(xyz):  # pragma: no cover - compiled
-    """Lowest and highest of each column. Without thought for what is not a number, of which the
-    readers let none through, and which would make it twice as slow."""
+    """Minimum and maximum (3,) of each column of points (N, 3). NaN is not handled: the readers
+    refuse it, and the check would take twice as long."""
     low_x, low_y, low_z = high_x, high_y, high_z = xyz[0, 0], xyz[0, 1], xyz[0, 2]
     for i in range(len(xyz)):
         x, y, z = xyz[i, 0], xyz[i, 1], xyz[i, 2]
@@ -24,6 +24,7 @@ def extremes(xyz):  # pragma: no cover - compiled
 
 @numba.njit(parallel=True, **COMPILED)
 def voxel_of(xyz, origin, voxel_size, nz, ny, nx):  # pragma: no cover - compiled
+    """(N,) flat [z, y, x] index of the voxel of each point (N, 3), clipped to the grid."""
     voxel = np.empty(len(xyz), np.int64)
     for i in numba.prange(len(xyz)):
         x = min(nx - 1, max(0, math.floor((xyz[i, 0] - origin[0]) / voxel_size)))
@@ -35,10 +36,19 @@ def voxel_of(xyz, origin, voxel_size, nz, ny, nx):  # pragma: no cover - compile
 
 @numba.njit(**COMPILED)
 def tally(voxel, tower, n_voxels):  # pragma: no cover - compiled
-    """Occupied voxels, ascending, with their points and whether one of them is a tower's.
+    """Occupied voxels, ascending, with the number of points in each and whether any is a tower
+    point.
 
-    A bit a voxel says which are occupied. How many bits are set before one is its place in the
-    answer: no sorting, and no array as large as the grid but the bits.
+    One bit per voxel marks the occupied ones. The number of bits set before a voxel's bit is its
+    position in the result, so nothing is sorted, and only the bits are as large as the grid.
+
+    Args:
+        voxel: (N,) int64 flat index of the voxel of each point.
+        tower: (N,) bool, whether each point is labelled tower.
+        n_voxels: voxels of the grid.
+
+    Returns:
+        (M,) int32 flat indices, (M,) int32 numbers of points, (M,) bool.
     """
     one = np.uint64(1)
     bits = np.zeros((n_voxels + 63) // 64, np.uint64)
@@ -63,7 +73,7 @@ def tally(voxel, tower, n_voxels):  # pragma: no cover - compiled
 
 @numba.njit(**COMPILED)
 def _ones(word):  # pragma: no cover - compiled
-    """Bits set in an uint64: counted in pairs, then fours, then bytes, all at once."""
+    """Number of bits set in a uint64: counted in pairs, then fours, then bytes, in parallel."""
     word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
     fours = np.uint64(0x3333333333333333)
     word = (word & fours) + ((word >> np.uint64(2)) & fours)

@@ -15,18 +15,18 @@ from scenenet.pointcloud.cloud import PointCloud
 Fit = Literal["cube", "metric"]
 
 MAX_VOXELS = 2**28
-"""Voxels of the largest grid, 16 times that of 256^3: its probabilities take 1 GiB."""
+"""Voxels of the largest grid allowed, 16 times as many as 256^3: its probabilities take 1 GiB."""
 
 
 class VoxelSettings(Settings):
-    """How a crop becomes a grid."""
+    """The grid of a crop."""
 
     fit: Fit = Field(
         "cube",
-        description="cube: resolution^3 voxels over the bounding cube of the crop, as the thesis; "
+        description="cube: resolution^3 voxels over the bounding cube of the crop (thesis); "
         "metric: as many voxels of voxel_size as the crop needs",
     )
-    resolution: Literal[32, 64, 128, 256] = Field(64, description="voxels an edge, for fit cube")
+    resolution: Literal[32, 64, 128, 256] = Field(64, description="voxels per edge, for fit cube")
     voxel_size: float = Field(1.0, gt=0, description="edge of a voxel in m, for fit metric")
 
     def grid(self, xyz: np.ndarray) -> VoxelGrid:
@@ -37,7 +37,7 @@ class VoxelSettings(Settings):
 
     @property
     def label(self) -> str:
-        """A name for folders: cube-64, metric-0.9m."""
+        """Name of the folder: cube-64, metric-0.9m."""
         return f"cube-{self.resolution}" if self.fit == "cube" else f"metric-{self.voxel_size:g}m"
 
 
@@ -46,8 +46,8 @@ class VoxelGrid:
     """A regular grid of cubic voxels in map coordinates.
 
     Attributes:
-        origin: (x, y, z) m, the lowest corner.
-        voxel_size: m, edge of a voxel.
+        origin: (x, y, z) of the lowest corner, m.
+        voxel_size: edge of a voxel, m.
         shape: (nz, ny, nx) voxels.
     """
 
@@ -57,22 +57,23 @@ class VoxelGrid:
 
     @classmethod
     def cube(cls, xyz: np.ndarray, resolution: int) -> VoxelGrid:
-        """resolution^3 voxels over the bounding cube: the bounding box, each side widened about
-        its middle to the longest one, which sets the voxel (the published code does the same).
+        """resolution^3 voxels over the bounding cube of points (N, 3): each side of the bounding
+        box is widened about its middle to the longest side, as in the published code.
 
         Raises:
-            InputError: there are no points, or they all lie at one place.
+            InputError: there are no points, or all have the same coordinates.
         """
         low, high = _bounds(xyz)
         side = float((high - low).max())
         if side <= 0:
-            raise InputError("all points lie at one place, so no cube can be laid over them")
+            raise InputError("all points have the same coordinates, so they have no bounding cube")
         origin = (low + high - side) / 2
         return cls(tuple(origin.tolist()), side / resolution, (resolution,) * 3)
 
     @classmethod
     def metric(cls, xyz: np.ndarray, voxel_size: float) -> VoxelGrid:
-        """As many voxels of ``voxel_size`` as the points need, centred on their bounding box.
+        """As many voxels of ``voxel_size`` (m) as points (N, 3) need, centred on their bounding
+        box.
 
         Raises:
             InputError: there are no points, or they are too far apart.
@@ -82,8 +83,8 @@ class VoxelGrid:
         if np.prod(counts.astype(float)) > MAX_VOXELS:
             extent = " x ".join(f"{side:.0f}" for side in high - low)
             raise InputError(
-                f"points over {extent} m need more than {MAX_VOXELS} voxels of {voxel_size:g} m",
-                remedy="Remove stray points, or take larger voxels",
+                f"a grid over {extent} m needs more than {MAX_VOXELS} voxels of {voxel_size:g} m",
+                remedy="Remove stray points, or use larger voxels",
             )
         origin = (low + high - counts * voxel_size) / 2
         return cls(tuple(origin.tolist()), float(voxel_size), tuple(counts[::-1].tolist()))
@@ -95,8 +96,8 @@ class VoxelGrid:
     def voxel_of(self, xyz: np.ndarray) -> np.ndarray:
         """(N,) int64 flat C-order [z, y, x] index of the voxel of each point.
 
-        Points on the upper border belong to the last voxel; others outside are clipped to the
-        border, which happens through rounding alone where the grid was made for these points.
+        Points on the upper border belong to the last voxel. Points outside are clipped to the grid;
+        if the grid was made for these points, only rounding puts them outside.
         """
         from scenenet.dataset.voxel_counts import voxel_of
 
@@ -104,21 +105,21 @@ class VoxelGrid:
         return voxel_of(xyz, np.asarray(self.origin, float), self.voxel_size, nz, ny, nx)
 
     def centres(self, index: np.ndarray) -> np.ndarray:
-        """(M, 3) xyz, m, of the middle of the voxels at flat ``index`` (M,)."""
+        """(M, 3) xyz of the centres of the voxels at flat ``index`` (M,), m."""
         z, y, x = np.unravel_index(index, self.shape)
         return np.asarray(self.origin) + (np.stack([x, y, z], axis=1) + 0.5) * self.voxel_size
 
 
 @dataclass(frozen=True)
 class VoxelSample:
-    """A crop on its grid: only the occupied voxels are kept, since all others are empty.
+    """A crop on its grid; only occupied voxels are stored.
 
     Attributes:
         id: name of the crop.
         grid: where the voxels lie.
-        index: (M,) int32, flat C-order positions of the occupied voxels, ascending.
-        count: (M,) int32, points in each.
-        tower: (M,) bool, whether any of them is labelled tower: the ground truth.
+        index: (M,) int32, flat C-order [z, y, x] positions of the occupied voxels, ascending.
+        count: (M,) int32, number of points in each.
+        tower: (M,) bool, whether any of its points is labelled tower: the ground truth.
     """
 
     id: str
@@ -130,15 +131,15 @@ class VoxelSample:
     def phi(self, measurement: Measurement) -> np.ndarray:
         """The measurement at the occupied voxels, (M,) float32 in [0, 1] (thesis 4.2.2, 5.3.2).
 
-        presence: 1 where there is any point. density: points in relation to the fullest voxel.
+        presence: 1. density: number of points over that of the fullest voxel.
         """
         if measurement == "presence":
             return np.ones(len(self.index), np.float32)
         return (self.count / self.count.max()).astype(np.float32)
 
     def spread(self, occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Probability (V,) float32 and truth (V,) bool of every voxel of the grid, from the
-        probability (M,) of the occupied ones; that of the others is 0."""
+        """Probability (V,) float32 and label (V,) bool of every voxel of the grid, from the
+        probability (M,) of the occupied ones; empty voxels have 0."""
         probability = np.zeros(self.grid.n_voxels, np.float32)
         probability[self.index] = occupied
         truth = np.zeros(self.grid.n_voxels, bool)
@@ -154,7 +155,7 @@ def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSa
     """Count points and tower points in each voxel of ``grid``.
 
     Raises:
-        InputError: the meaning of the class codes is not known.
+        InputError: the class scheme of the cloud is not known.
     """
     from scenenet.dataset.voxel_counts import tally
 
@@ -164,7 +165,7 @@ def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSa
 
 def _bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if len(xyz) == 0:
-        raise InputError("there are no points to lay a grid over")
+        raise InputError("there are no points, so there is no grid")
     from scenenet.dataset.voxel_counts import extremes
 
     return extremes(xyz)

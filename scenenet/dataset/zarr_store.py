@@ -1,8 +1,8 @@
-"""One zarr store a survey and stage, with a manifest that says what must be in it.
+"""One zarr store per survey and stage, with a manifest that lists its content.
 
-The store is a single zip file: no part of it can go missing unseen, as a chunk of a folder can, and
-it appears whole or not at all. The manifest carries its digest; a stage reads the manifest and
-refuses a store that does not match it.
+The store is a single zip file: unlike a folder of chunks it cannot lose a part unnoticed, and it
+is written whole or not at all. The manifest has its digest; a stage reads the manifest and refuses
+a store that does not match.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scenenet.core.files import atomic, read_json, sha256, write_json
 
 
 class StoreWriter:
-    """Writes named groups of arrays, each once; see ``create``."""
+    """Writes named groups of arrays; see ``create``."""
 
     def __init__(self, root: Any) -> None:
         self._root = root
@@ -43,7 +43,7 @@ class StoreWriter:
 
     @property
     def content(self) -> str:
-        """Digest of the arrays: the same for the same data, whenever they are written."""
+        """Digest of the arrays; it depends on the data alone, not on the time of writing."""
         return self._digest.hexdigest()
 
 
@@ -54,7 +54,7 @@ def create(store: str | Path, manifest: str | Path, facts: dict[str, Any]) -> It
     Args:
         store: path of the ``.zarr.zip`` file.
         manifest: path of the JSON file, in the same folder.
-        facts: what else the manifest says; may be filled until the block ends.
+        facts: further entries of the manifest; may be filled until the block ends.
     """
     import zarr
     from zarr.storage import ZipStore
@@ -77,29 +77,31 @@ class StoreReader:
     """Reads a store through its manifest.
 
     Attributes:
-        manifest: what the manifest says.
+        manifest: content of the manifest.
     """
 
     def __init__(self, manifest: str | Path) -> None:
         """Check the store against ``manifest`` and open it.
 
         Raises:
-            InputError: the store is missing or is not the one the manifest was written for.
+            InputError: the store is missing, or is not the one that the manifest was written for.
         """
         import zarr
         from zarr.storage import ZipStore
 
-        remedy = "Delete its manifest and run again to make both anew"
+        remedy = "Delete its manifest and run again to create both"
         try:
             self.manifest = read_json(manifest)
             store = Path(manifest).parent / self.manifest["store"]
         except (OSError, ValueError, KeyError, TypeError) as error:
-            problem = f"not a readable manifest ({type(error).__name__}: {error})"
+            problem = f"the manifest cannot be read ({type(error).__name__}: {error})"
             raise InputError(problem, file=manifest, remedy=remedy) from None
         if not store.is_file():
             raise InputError("the store is missing", file=store, remedy=remedy)
         if sha256(store) != self.manifest["sha256"]:
-            raise InputError("the store was changed after it was made", file=store, remedy=remedy)
+            raise InputError(
+                "the store was changed after it was written", file=store, remedy=remedy
+            )
         self._root = zarr.open_group(ZipStore(store, mode="r"), mode="r")
 
     def get(self, name: str) -> dict[str, np.ndarray]:

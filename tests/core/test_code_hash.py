@@ -1,4 +1,4 @@
-"""The code behind a result counts by what it does, wherever it stands in the package."""
+"""The code behind a result counts by what it does, wherever it is in the package."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Package:
 
     @staticmethod
     def forget() -> None:
-        """Code is read once in a process; here it changes."""
+        """Clear the caches: code is read once per process, but these tests change it."""
         for cached in (codehash._locate, codehash._read, codehash._data_files):
             cached.cache_clear()
         importlib.invalidate_caches()
@@ -170,7 +170,7 @@ def test_imports_for_type_checkers_do_not_count(package):
     assert "far" not in used
 
 
-def test_an_init_that_only_hands_names_on_is_looked_through(package):
+def test_an_init_that_only_imports_names_is_transparent(package):
     package.write(
         "inner/__init__.py",
         '"""Doc."""\nfrom PACKAGE.inner.a import one\nfrom PACKAGE.inner.b import two as second\n'
@@ -223,7 +223,7 @@ def test_templates_of_a_package_count_with_its_modules(package):
     assert package.hash(script) != before
 
 
-def test_a_script_counts_the_scripts_beside_it_that_it_imports(package):
+def test_a_script_counts_the_scripts_in_its_folder_that_it_imports(package):
     package.script("import helper", "stage.py")
     helper = package.script("from PACKAGE.far import reach", "helper.py")
     package.write("far.py", "reach = 1")
@@ -234,7 +234,7 @@ def test_a_script_counts_the_scripts_beside_it_that_it_imports(package):
     assert package.hash(script) != before
 
 
-def test_modules_that_import_each_other_end(package):
+def test_circular_imports_are_handled(package):
     package.write("a.py", "from PACKAGE import b")
     package.write("b.py", "from PACKAGE import a")
     assert package.used(package.script("import PACKAGE.a")) == {"a", "b"}
@@ -242,7 +242,7 @@ def test_modules_that_import_each_other_end(package):
 
 def test_a_script_that_is_not_python_is_an_error_that_says_where(package):
     script = package.script("x = = 1")
-    with pytest.raises(InputError, match=r"stage\.py: line 1: is not Python"):
+    with pytest.raises(InputError, match=r"stage\.py: line 1: the file is not valid Python"):
         package.hash(script)
 
 
@@ -254,7 +254,7 @@ def test_predicting_depends_on_the_kernels_though_it_imports_none_by_name():
     assert "scenenet.geneo.kernels.cylinder" in used_by("predict")
 
 
-def test_the_wording_of_a_check_is_no_part_of_the_dataset():
+def test_crops_and_training_do_not_depend_on_the_wording_of_a_check():
     """Both import the package of point clouds."""
     assert "scenenet.pointcloud.quality.report" in used_by("check")
     assert "scenenet.pointcloud.quality.report" not in used_by("crops") | used_by("train")

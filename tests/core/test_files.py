@@ -1,4 +1,4 @@
-"""Outputs appear whole or not at all, and digests tell content."""
+"""Outputs are written whole or not at all, and digests depend on content."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def everything_in(folder: Path) -> list[str]:
     return sorted(p.name for p in folder.iterdir())
 
 
-def test_a_file_is_not_there_before_it_is_whole(tmp_path):
+def test_a_file_does_not_exist_before_it_is_complete(tmp_path):
     target = tmp_path / "new" / "table.csv"
     with atomic(target) as partial:
         partial.write_text("half")
@@ -52,7 +52,7 @@ def test_a_folder_is_replaced_as_a_whole(tmp_path):
     assert everything_in(tmp_path) == ["report"]
 
 
-def test_json_without_a_number_for_nan_is_refused_and_the_old_file_stays(tmp_path):
+def test_nan_is_refused_in_json_and_the_old_file_stays(tmp_path):
     target = tmp_path / "scores.json"
     write_json(target, {"f05": 0.5})
     with pytest.raises(ValueError, match="JSON"):
@@ -60,18 +60,18 @@ def test_json_without_a_number_for_nan_is_refused_and_the_old_file_stays(tmp_pat
     assert read_json(target) == {"f05": 0.5}
 
 
-def test_text_keeps_its_letters(tmp_path):
+def test_text_is_written_as_utf_8(tmp_path):
     write_text(tmp_path / "name.txt", "Évora → Setúbal\n")
     assert (tmp_path / "name.txt").read_bytes().decode("utf-8") == "Évora → Setúbal\n"
 
 
-def test_sha256_is_that_of_the_content(tmp_path):
+def test_sha256_matches_a_known_digest(tmp_path):
     (tmp_path / "abc").write_bytes(b"abc")
     known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
     assert sha256(tmp_path / "abc") == known
 
 
-def test_digest_depends_on_what_is_said_and_not_on_the_order_of_keys():
+def test_digest_depends_on_content_and_not_on_the_order_of_keys():
     settings = {"epochs": 50, "loss": {"alpha": 5.0, "epsilon": 0.1}}
     reordered = json.loads('{"loss": {"epsilon": 0.1, "alpha": 5.0}, "epochs": 50}')
     assert digest(settings) == digest(reordered)

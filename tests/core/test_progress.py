@@ -1,4 +1,4 @@
-"""Progress goes to stderr and leaves the items alone."""
+"""Progress is written to stderr and does not change the items."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ def test_items_pass_through_and_a_log_gets_a_last_line(capsys):
     assert err == "letters: done (3)\n"
 
 
-def test_a_log_is_told_how_far_it_is_now_and_then(capsys, monkeypatch):
+def test_a_log_gets_a_line_at_each_interval(capsys, monkeypatch):
     monkeypatch.setattr(progress, "LOG_INTERVAL_S", 0.0)
     list(track([1, 2], "crops"))
     assert capsys.readouterr().err.splitlines() == ["crops: 1/2", "crops: 2/2", "crops: done (2)"]
 
 
-def test_nothing_to_do_is_done():
+def test_an_empty_iterable_yields_nothing():
     assert list(track([], "crops")) == []

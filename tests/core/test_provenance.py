@@ -1,4 +1,4 @@
-"""Inputs count by their content, and a result says what it was made from."""
+"""Inputs are identified by their content, and a result records what made it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_another_file_with_an_older_date_has_another_fingerprint(survey, tmp_pat
     assert fingerprint(survey) != before
 
 
-def test_a_large_file_is_known_by_size_and_date(survey):
+def test_a_large_file_is_identified_by_size_and_date(survey):
     os.utime(survey, ns=(1, 1_500_000_001))
     assert fingerprint(survey, full_below_bytes=6) == "size-mtime:6-1500000001"
     assert fingerprint(survey, full_below_bytes=7).startswith("sha256:")
@@ -57,7 +57,7 @@ def samples(tmp_path):
     return folder
 
 
-def test_a_folder_is_known_by_its_samples(samples):
+def test_a_folder_is_identified_by_its_samples(samples):
     before = fingerprint(samples)
     assert before.startswith("folder:2-")
     (samples / "notes.txt").write_text("not a sample")
@@ -79,7 +79,7 @@ def test_a_changed_sample_changes_its_folder(samples, change):
     assert fingerprint(samples) != before
 
 
-def test_the_samples_of_a_large_folder_are_known_by_size_and_date(samples):
+def test_the_samples_of_a_large_folder_are_identified_by_size_and_date(samples):
     below = fingerprint(samples, full_below_bytes=10)  # of 5 bytes and 4
     above = fingerprint(samples, full_below_bytes=9)
     os.utime(samples / "a.npy", ns=(1, 1))
@@ -87,7 +87,7 @@ def test_the_samples_of_a_large_folder_are_known_by_size_and_date(samples):
     assert fingerprint(samples, full_below_bytes=9) != above
 
 
-def test_a_file_that_is_not_there_is_named(tmp_path):
+def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(InputError, match=r"gone\.laz: cannot be read"):
         fingerprint(tmp_path / "gone.laz")
 
@@ -100,7 +100,7 @@ def test_a_record_has_a_seed_only_where_random_numbers_are_drawn():
     assert record["version"] == provenance.package_version()
 
 
-def test_settings_are_written_so_that_they_can_be_read_again(tmp_path):
+def test_written_settings_can_be_read_back(tmp_path):
     settings = {"voxels": {"fit": "cube"}, "seeds": [0, 1], "surveys": None, "name": "évora"}
     provenance.write_settings(tmp_path / "config.yaml", settings)
     text = (tmp_path / "config.yaml").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The surroundings of each tower, cut out of a survey."""
+"""Crops: the surroundings of each tower."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def table(*towers: tuple[float, float, float]) -> pd.DataFrame:
 
 @pytest.fixture
 def field(tmp_path):
-    """A survey of 60 x 40 m with a point a metre, and its cloud."""
+    """A survey of 60 x 40 m with one point per m^2, and its cloud."""
     x, y = np.meshgrid(np.arange(60.0), np.arange(40.0))
     xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + ORIGIN
     codes = np.random.default_rng(0).integers(0, 20, len(xyz)).astype(np.uint8)
@@ -79,7 +79,7 @@ def test_crops_do_not_depend_on_the_chunks_a_survey_is_read_in(field, tmp_path, 
         np.testing.assert_array_equal(a.xyz, b.xyz)
 
 
-def test_a_crop_knows_all_towers_in_it(field, tmp_path):
+def test_a_crop_lists_all_towers_in_it(field, tmp_path):
     _, crops = cut(field[0], table((20, 20, 15.0), (30, 20, 5.0), (50, 20, 5.0)), tmp_path)
     assert [len(crop.towers) for crop, _ in crops] == [2, 1, 1]
     np.testing.assert_array_equal(crops[0][0].towers, ORIGIN[:2] + np.array([[20, 20], [30, 20]]))
@@ -91,7 +91,7 @@ def test_a_survey_without_towers_gives_an_empty_store(field, tmp_path):
     assert facts["crops"] == crops == []
 
 
-def test_samples_are_taken_as_they_are(tmp_path, scene):
+def test_samples_are_copied_unchanged(tmp_path, scene):
     folder = tmp_path / "samples"
     folder.mkdir()
     clouds = {"sample_1": scene(seed=1), "sample_2": scene(seed=2), "sample_3": scene(poles=())}
@@ -103,4 +103,4 @@ def test_samples_are_taken_as_they_are(tmp_path, scene):
     np.testing.assert_array_equal(crops[0][1].xyz, clouds["sample_1"].xyz)
     np.testing.assert_array_equal(crops[0][1].classification, clouds["sample_1"].classification)
     assert crops[0][0].radius == pytest.approx(14, abs=0.1)
-    assert facts["skipped"] == [{"sample": "sample_3.npy", "reason": "no tower found in it"}]
+    assert facts["skipped"] == [{"sample": "sample_3.npy", "reason": "it has no labelled tower"}]

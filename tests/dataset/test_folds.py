@@ -1,4 +1,4 @@
-"""Folds are fixed, leave every crop out once, and never train beside a crop that is left out."""
+"""Folds are fixed, leave out every crop once, and never train on a neighbour of one left out."""
 
 from __future__ import annotations
 
@@ -20,24 +20,26 @@ def test_folds_follow_the_names_and_not_the_order_of_the_list():
     made = folds(crops, 2, neighbour=100)
     assert [[names[i] for i in fold.out] for fold in made] == [["a", "b"], ["c", "d"], ["e"]]
     for fold in made:
-        assert sorted(fold.out + fold.learnt) == [0, 1, 2, 3, 4]
-        assert fold.beside == []
+        assert sorted(fold.out + fold.train) == [0, 1, 2, 3, 4]
+        assert fold.excluded == []
 
 
-def test_neighbours_of_a_crop_that_is_left_out_are_in_no_part():
+def test_neighbours_of_a_crop_that_is_left_out_are_excluded():
     crops = [crop(f"{i}", 70.0 * i) for i in range(8)]
     first, second, *_ = folds(crops, 2, neighbour=100)
-    assert (first.out, first.beside, first.learnt) == ([0, 1], [2], [3, 4, 5, 6, 7])
-    assert (second.out, second.beside, second.learnt) == ([2, 3], [1, 4], [0, 5, 6, 7])
+    assert (first.out, first.excluded, first.train) == ([0, 1], [2], [3, 4, 5, 6, 7])
+    assert (second.out, second.excluded, second.train) == ([2, 3], [1, 4], [0, 5, 6, 7])
 
 
-def test_crops_that_share_ground_are_neighbours_however_near_those_are():
+def test_overlapping_crops_are_neighbours_at_any_neighbour_distance():
     crops = [crop("a", 0), crop("b", 35), crop("c", 400), crop("d", 800)]
     made = folds(crops, 1, neighbour=0)
-    assert [fold.beside for fold in made] == [[1], [0], [], []]
+    assert [fold.excluded for fold in made] == [[1], [0], [], []]
 
 
 def test_too_few_crops_to_train_on_are_refused():
     crops = [crop(f"{i}", 70.0 * i) for i in range(4)]
-    with pytest.raises(InputError, match="with 0, 1 left out, 1 of 4 crops can be trained on"):
+    with pytest.raises(
+        InputError, match="with 0, 1 left out, only 1 of 4 crops remain for training"
+    ):
         folds(crops, 2, neighbour=100)

@@ -1,4 +1,4 @@
-"""Tower instances: which points belong together, and what a tower measures."""
+"""Labelled towers: instances and their measures."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def box(x: float, y: float, *, width=2.0, length=4.0, height=20.0, n=4000, turn=
     return np.column_stack([plan + np.array([x, y]), z]) + ORIGIN
 
 
-def test_no_tower_points_no_towers():
+def test_without_tower_points_there_are_no_towers():
     table = find_towers(np.empty((0, 3)), SETTINGS)
     assert len(table) == 0
     assert tuple(table.columns) == COLUMNS
@@ -52,7 +52,7 @@ def test_a_box_has_the_measures_it_was_made_with(turn):
     assert np.isnan(tower["spacing"])
 
 
-def test_the_side_that_was_scanned_more_often_does_not_pull_the_centre():
+def test_the_side_with_more_points_does_not_shift_the_centre():
     even = box(0, 0, n=4000)
     one_side = box(0, 0, n=40_000, seed=1)
     one_side = one_side[one_side[:, 0] > ORIGIN[0] + 1]
@@ -71,7 +71,7 @@ def test_points_nearer_than_eps_are_one_tower():
     assert len(find_towers(np.concatenate([box(0, 0), box(12, 0)]), SETTINGS)) == 1
 
 
-def test_a_few_stray_points_are_no_tower():
+def test_a_few_stray_points_are_not_a_tower():
     stray = box(60, 0, n=100)
     labels = cluster(np.concatenate([box(0, 0), stray]), SETTINGS)
     assert set(labels[:4000]) == {0}
@@ -87,7 +87,7 @@ def test_thinned_clusters_are_those_of_all_points(seed):
     xyz = rng.permutation(np.concatenate([*parts, noise]))
     plain = DBSCAN(eps=SETTINGS.eps, min_samples=SETTINGS.min_points).fit_predict(xyz)
     thinned = cluster(xyz, SETTINGS)
-    # Points at the rim of a cluster may fall the other way, because a cell speaks for its points.
+    # Points at the edge of a cluster may differ, because a cell represents all of its points.
     surely = (plain >= 0) & (thinned >= 0)
     assert adjusted_rand_score(plain[surely], thinned[surely]) == 1.0
     assert len(set(plain)) == len(set(thinned))
@@ -116,9 +116,9 @@ def test_a_line_around_a_bend_is_followed():
     assert along in ([0, 1, 2, 3, 4, 5], [5, 4, 3, 2, 1, 0])
 
 
-def test_only_points_labelled_tower_are_looked_at(tmp_path):
-    wire = box(80, 0)
-    xyz = np.concatenate([box(0, 0), wire])
+def test_only_points_labelled_tower_are_used(tmp_path):
+    conductor = box(80, 0)
+    xyz = np.concatenate([box(0, 0), conductor])
     codes = np.repeat([15, 16], 4000).astype(np.uint8)
     write_las(tmp_path / "survey.laz", PointCloud(xyz, codes))
     assert len(survey_towers(tmp_path / "survey.laz", "edp", SETTINGS)) == 1

@@ -1,4 +1,4 @@
-"""The split: parts by stretch of line, and no neighbour on another side."""
+"""The split: parts by stretch of line, without neighbours in different parts."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def straight(n: int, spacing: float = 100.0, start=(0.0, 0.0)):
 
 
 def leaks(table: pd.DataFrame, neighbour: float) -> list[tuple[str, str]]:
-    """Consecutive crops of a survey that are neighbours and lie in different parts.
+    """Consecutive crops of a survey that are neighbours and are in different parts.
 
-    The rows of the table follow the line; see test_towers for the order.
+    The rows of the table follow the line; see test_labelled_towers for the order.
     """
     return [
         (a.crop, b.crop)
@@ -49,7 +49,7 @@ def leaks(table: pd.DataFrame, neighbour: float) -> list[tuple[str, str]]:
 
 
 def overlaps(table: pd.DataFrame, radius: dict[str, float]) -> list[tuple[str, str]]:
-    """Crops of a survey that share ground and lie in different parts, guards not counted."""
+    """Crops of a survey that overlap and are in different parts, without guards."""
     kept = table[table["part"] != GUARD]
     return [
         (a.crop, b.crop)
@@ -62,7 +62,7 @@ def overlaps(table: pd.DataFrame, radius: dict[str, float]) -> list[tuple[str, s
 
 @st.composite
 def lines(draw):
-    """Towers along a line that may turn by up to 150 degrees at each tower, and come back."""
+    """Towers along a line that may turn by up to 150 degrees at each tower, and return."""
     n = draw(st.integers(3, 40))
     steps = np.array(draw(st.lists(st.floats(30, 600), min_size=n, max_size=n)))
     turns = np.array(draw(st.lists(st.floats(-2.6, 2.6), min_size=n, max_size=n)))
@@ -79,7 +79,7 @@ def lines(draw):
     st.integers(0, 5),
 )
 @example(straight(40), 20.0, 4, 500.0, 0)
-def test_no_neighbour_and_no_shared_ground_on_another_side(
+def test_no_neighbours_and_no_overlapping_crops_in_different_parts(
     tmp_path_factory, xy, radius, stretch, neighbour, seed
 ):
     path = manifest(tmp_path_factory.mktemp("line") / "m.json", "a", xy, radius)
@@ -87,7 +87,7 @@ def test_no_neighbour_and_no_shared_ground_on_another_side(
     try:
         table = split_crops([path], settings)
     except InputError as error:
-        assert "no crop is left" in str(error)
+        assert "no crop remains" in str(error)
         return
     assert leaks(table, neighbour) == []
     assert overlaps(table, dict.fromkeys(table["crop"], radius)) == []
@@ -95,7 +95,7 @@ def test_no_neighbour_and_no_shared_ground_on_another_side(
     assert set(PARTS) <= set(table["part"]) <= {*PARTS, GUARD}
 
 
-def test_crops_that_share_ground_stay_together_however_near_neighbours_may_be(tmp_path):
+def test_overlapping_crops_stay_together_at_any_neighbour_distance(tmp_path):
     xy = straight(24, 100.0)
     path = manifest(tmp_path / "m.json", "a", xy, radius=[60.0, 60.0, 30.0, 30.0] * 6)
     table = split_crops([path], SplitSettings(stretch=1, neighbour=0.0))
@@ -104,7 +104,7 @@ def test_crops_that_share_ground_stay_together_however_near_neighbours_may_be(tm
         assert parts[f"a-{i:04d}"] == parts[f"a-{i + 1:04d}"] != GUARD
 
 
-def test_a_line_that_comes_back_beside_itself_stays_on_one_side_there(tmp_path):
+def test_a_line_that_returns_next_to_itself_stays_in_one_part_there(tmp_path):
     out = straight(10, 100.0)
     back = np.column_stack([np.arange(9, -1, -1) * 100.0 + 100.0, np.full(10, 90.0)])
     far = straight(20, 100.0, (0, 50_000))
@@ -114,7 +114,7 @@ def test_a_line_that_comes_back_beside_itself_stays_on_one_side_there(tmp_path):
         assert overlaps(table, dict.fromkeys(table["crop"], 50.0)) == []
 
 
-def test_parts_are_about_as_large_as_asked(tmp_path):
+def test_parts_have_about_their_shares(tmp_path):
     path = manifest(tmp_path / "m.json", "a", straight(400, 600.0))
     table = split_crops([path], SplitSettings(neighbour=500.0, stretch=4))
     shares = table["part"].value_counts(normalize=True)
@@ -123,7 +123,7 @@ def test_parts_are_about_as_large_as_asked(tmp_path):
     assert GUARD not in shares
 
 
-def test_one_crop_is_set_aside_at_each_border_of_parts_and_no_other(tmp_path):
+def test_one_crop_is_left_out_at_each_border_of_parts_and_no_other(tmp_path):
     path = manifest(tmp_path / "m.json", "a", straight(80))
     table = split_crops([path], SplitSettings(stretch=4))
     parts = table["part"].tolist()
@@ -137,7 +137,7 @@ def test_one_crop_is_set_aside_at_each_border_of_parts_and_no_other(tmp_path):
     assert len(guards) == borders
 
 
-def test_a_stretch_is_cut_after_as_many_towers_as_asked_and_where_the_line_has_a_gap(tmp_path):
+def test_a_stretch_ends_after_its_number_of_towers_and_at_a_gap_of_the_line(tmp_path):
     xy = np.concatenate([straight(6), straight(6, start=(5000, 0))])
     path = manifest(tmp_path / "m.json", "a", xy)
     table = split_crops([path], SplitSettings(stretch=4))
@@ -166,7 +166,7 @@ def test_surveys_are_separate_lines(tmp_path):
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])
-def test_fewer_crops_than_parts_are_refused_with_what_to_do(tmp_path, n):
+def test_fewer_crops_than_parts_are_refused_with_a_remedy(tmp_path, n):
     path = manifest(tmp_path / "m.json", "a", straight(n))
     with pytest.raises(InputError, match=rf"{n} crops cannot be split.*Add surveys"):
         split_crops([path], SplitSettings())
@@ -177,19 +177,19 @@ def test_no_survey_at_all_is_refused():
         split_crops([], SplitSettings())
 
 
-def test_a_line_too_short_for_three_parts_is_refused_with_what_to_do(tmp_path):
+def test_a_line_too_short_for_three_parts_is_refused_with_a_remedy(tmp_path):
     path = manifest(tmp_path / "m.json", "a", straight(5))
-    with pytest.raises(InputError, match=r"no crop is left for .*among 5 crops in 2 stretches"):
+    with pytest.raises(InputError, match=r"no crop remains for .*out of 5 crops in 2 stretches"):
         split_crops([path], SplitSettings(stretch=4))
 
 
-def test_a_part_without_a_share_is_not_missed(tmp_path):
+def test_a_part_without_a_share_may_be_empty(tmp_path):
     path = manifest(tmp_path / "m.json", "a", straight(20, 600.0))
     settings = SplitSettings(train=0.8, validation=0.2, test=0.0)
     assert set(split_crops([path], settings)["part"]) == {"train", "validation"}
 
 
-def test_shares_must_be_all():
+def test_shares_must_sum_to_one():
     with pytest.raises(ValidationError, match="must sum to 1"):
         SplitSettings(train=0.5)
 

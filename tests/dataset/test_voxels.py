@@ -65,12 +65,12 @@ def test_the_metric_grid_has_as_many_voxels_as_the_points_need():
 def test_a_single_point_has_a_metric_grid_but_no_cube():
     one = np.array([[500_000.0, 4_630_000.0, 7.0]])
     assert VoxelGrid.metric(one, 0.5).shape == (1, 1, 1)
-    with pytest.raises(InputError, match="one place"):
+    with pytest.raises(InputError, match="same coordinates"):
         VoxelGrid.cube(one, 64)
 
 
-def test_a_stray_point_that_would_blow_up_the_grid_is_refused():
-    with pytest.raises(InputError, match=r"points over 0 x 0 x 9000 m.*Remove stray points"):
+def test_a_stray_point_that_makes_the_grid_too_large_is_refused():
+    with pytest.raises(InputError, match=r"a grid over 0 x 0 x 9000 m.*Remove stray points"):
         VoxelGrid.metric(np.array([[0, 0, 0], [0, 0, 9000.0]]), 0.00001)
 
 
@@ -82,7 +82,7 @@ def test_no_points_have_no_grid(settings):
 
 def test_a_voxel_is_a_tower_where_any_of_its_points_is():
     points = [[0.1, 0, 0]] * 99 + [[0.2, 0, 0], [1.5, 0, 0]]
-    codes = [2] * 99 + [15, 16]  # one tower point among ground; a wire is no tower
+    codes = [2] * 99 + [15, 16]  # one tower point among ground; a conductor is not a tower
     sample = voxelise(cloud(points, codes), VoxelGrid((0.0, 0.0, 0.0), 1.0, (1, 1, 3)))
     assert sample.index.tolist() == [0, 1]
     assert sample.count.tolist() == [100, 1]

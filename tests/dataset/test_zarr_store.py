@@ -1,4 +1,4 @@
-"""A store and its manifest belong together, and are there whole or not at all."""
+"""A store and its manifest belong together, and are written whole or not at all."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_arrays_come_back_bit_for_bit(tmp_path):
     assert reader.get("a-0002").keys() == {"code"}
 
 
-def test_the_manifest_says_what_must_be_there(tmp_path):
+def test_the_manifest_lists_the_content(tmp_path):
     manifest = read_json(write(tmp_path))
     assert manifest["store"] == "s.zarr.zip"
     assert manifest["survey"] == "a"
@@ -61,14 +61,14 @@ def test_other_data_other_content_digest(tmp_path, other):
     assert first["content"] != second["content"]
 
 
-def test_a_store_that_is_gone_is_named_with_what_to_do(tmp_path):
+def test_a_missing_store_is_named_with_a_remedy(tmp_path):
     manifest = write(tmp_path)
     (tmp_path / "s.zarr.zip").unlink()
     with pytest.raises(InputError, match=r"s\.zarr\.zip: the store is missing\. Delete its man"):
         StoreReader(manifest)
 
 
-def test_a_store_with_one_byte_changed_is_refused_with_what_to_do(tmp_path):
+def test_a_store_with_one_byte_changed_is_refused_with_a_remedy(tmp_path):
     manifest = write(tmp_path)
     store = tmp_path / "s.zarr.zip"
     damaged = bytearray(store.read_bytes())
@@ -78,7 +78,7 @@ def test_a_store_with_one_byte_changed_is_refused_with_what_to_do(tmp_path):
         StoreReader(manifest)
 
 
-def test_a_store_of_another_run_is_not_taken_for_this_one(tmp_path):
+def test_a_store_of_another_run_is_refused(tmp_path):
     manifest = write(tmp_path)
     write(tmp_path / "other", {"code": np.zeros(3, np.uint8)})
     (tmp_path / "other" / "s.zarr.zip").replace(tmp_path / "s.zarr.zip")

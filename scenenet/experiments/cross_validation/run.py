@@ -76,7 +76,7 @@ def run_folds(
     plans = [(seed, number, fold) for seed in seeds for number, fold in enumerate(parts, start=1)]
     rows = []
     for seed, number, fold in track(plans, f"{name}: folds"):
-        training = [dataset.samples[i] for i in fold.learnt]
+        training = [dataset.samples[i] for i in fold.train]
         left_out = [dataset.samples[i] for i in fold.out]
         tuned = train_and_tune(model, training, [], seed)
         shared = {

@@ -111,4 +111,4 @@ def test_the_folds_of_the_real_crops_are_those_of_docs_accuracy(real_data, tmp_p
     made = folds(crops, 2, neighbour=100)
     names = [[crops[i].id.removeprefix("ts40k-sample_") for i in fold.out] for fold in made]
     assert names == [["575", "578"], ["584", "588"], ["591", "593"]]
-    assert all(len(fold.learnt) == 4 for fold in made)
+    assert all(len(fold.train) == 4 for fold in made)

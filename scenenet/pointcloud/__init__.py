@@ -1,4 +1,14 @@
-"""Point clouds: what one is, reading and writing it safely, and checking what is in it."""
+"""Point clouds: reading them safely, writing them, and checking them.
+
+- ``cloud``: the point cloud that every stage works with.
+- ``class_schemes``: what class codes mean.
+- ``reading``: surveys of any format, whole or in chunks.
+- ``file_kinds``: the kind of a file, from its content and suffix.
+- ``las``: LAS, LAZ and COPC files.
+- ``ts40k``: samples of the TS40K dataset.
+- ``append_dimensions``: a copy of a survey with further dimensions.
+- ``quality``: the content of a survey and its defects (``scenenet check``).
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writing an existing survey back with dimensions added, and nothing else changed."""
+"""Write a copy of a survey with further dimensions and nothing else changed."""
 
 from __future__ import annotations
 
@@ -22,32 +22,33 @@ if TYPE_CHECKING:
 
 CHUNK_POINTS = 500_000
 REWRITTEN = {("LASF_Spec", 4), ("laszip encoded", 22204)}
-"""Records that laspy writes anew: the description of extra bytes, and of the compression."""
+"""Records that laspy creates itself: the descriptions of extra bytes and of the compression."""
 PLAIN_BYTES = 7
-"""Bytes that nothing describes come back as dimensions of so many: laspy takes the number of more
-for something else (a scale), and cannot read what it wrote."""
+"""Extra bytes without a description are written as dimensions of this many bytes: laspy
+misinterprets the number of more bytes as a scale, and cannot read the file that it wrote."""
 MIXED_UP_FORMATS = (9, 10)
-"""Formats whose waveform packets lazrs mixes up where a survey has several scanner channels (seen
-with 0.8.2: what it reads back is not what it was given)."""
+"""Formats whose waveform packets lazrs mixes up if a survey has several scanner channels (seen
+with 0.8.2: it does not read back what it wrote)."""
 MAX_RECORD, MAX_EXTRA = 0xFFFF, 0xFFFF // 192
-"""Most bytes of a point, and most extra dimensions: each has 192 bytes in a record of as many."""
+"""Most bytes of a point, and most extra dimensions: each takes 192 bytes of a record that has at
+most ``MAX_RECORD``."""
 Values = Callable[[np.ndarray], Mapping[str, np.ndarray]]
-"""(n, 3) coordinates -> (n,) numbers by name."""
+"""Coordinates (n, 3) -> name -> (n,) values."""
 
 
 def add_dimensions(
     source: str | Path, target: str | Path, names: Mapping[str, Dimension], values: Values
 ) -> int:
-    """Write a survey back with every point and everything it had, and dimensions added.
+    """Write a copy of a survey, with all of its points and content, and further dimensions.
 
     Points keep their order, stored integers, scale and offset and all other dimensions; variable
     length records and CRS are copied. Dimensions that an earlier call added (their description
-    says ``scenenet``) are replaced. Memory is bounded by a chunk. A COPC survey comes back as plain
+    says ``scenenet``) are replaced. Memory is bounded by a chunk. A COPC survey is written as plain
     LAZ, in the order of its file.
 
     Args:
         source: the survey: LAS, LAZ, COPC, or a .npy / .pt sample (written as ``write_las`` does).
-        target: ``.laz`` (or ``.las``) file; appears whole or not at all; may be ``source``.
+        target: ``.laz`` (or ``.las``) file; written whole or not at all; may be ``source``.
         names: name -> numpy type, or (type, description of up to 22 characters).
         values: gets (n, 3) float64 coordinates of consecutive points, returns (n,) numbers for
             each name.
@@ -56,9 +57,9 @@ def add_dimensions(
         the number of points.
 
     Raises:
-        InputError: the survey cannot be read, has a dimension of such a name from someone else,
-            waveforms that could not be kept, or no room for more dimensions.
-        ValueError: ``values`` did not return what ``names`` promises.
+        InputError: the survey cannot be read, has a dimension of the same name that another
+            program wrote, has waveforms that cannot be kept, or has no room for more dimensions.
+        ValueError: ``values`` did not return an array for each of ``names``.
     """
     source, target = Path(source), Path(target)
     dimensions = new_dimensions(names, own=True)
@@ -87,7 +88,7 @@ def _widened(
     header: laspy.LasHeader,
     arrays: Mapping[str, np.ndarray],
 ) -> laspy.ScaleAwarePointRecord:
-    """``records`` as points of ``header``: their bytes, then the new dimensions."""
+    """``records`` as points of ``header``: their bytes, followed by the new dimensions."""
     import laspy
 
     points = laspy.ScaleAwarePointRecord.zeros(len(records), header=header)
@@ -133,20 +134,20 @@ def _extended(header: CheckedHeader, dimensions: list[laspy.ExtraBytesParams]) -
             file=header.path,
             remedy="Remove extra dimensions first (pdal translate --writers.las.extra_dims)",
         )
-    # From the bytes of the file: laspy would write some records other than it read them.
+    # From the bytes of the file: laspy changes some records when it writes them.
     new.vlrs = [
         laspy.VLR(v.user_id, v.record_id, v.description, v.data)
         for v in header.vlrs
         if (v.user_id, v.record_id) not in REWRITTEN and not _is_octree(header, v.user_id)
     ]
-    for record in new.vlrs.get("ExtraBytesVlr"):  # and it forgets a value that means "no data"
+    for record in new.vlrs.get("ExtraBytesVlr"):  # laspy loses the "no data" value too
         record.extra_bytes_structs = [
             entry if entry.format_name() in {d.name for d in dimensions}
             else entries.get(entry.format_name(), entry)
             for entry in record.extra_bytes_structs
         ]  # fmt: skip
     new.creation_date = new.creation_date or NO_DATE
-    # laspy writes LAS from 1.1 on, and no point format in a version that did not have it.
+    # laspy writes LAS 1.1 and later, and a point format only in versions that have it.
     version, dims = laspy.header.Version, laspy.point.dims
     if new.point_format.id not in dims.VERSION_TO_POINT_FMT.get(str(new.version), ()):
         least = dims.preferred_file_version_for_point_format(new.point_format.id)
@@ -159,15 +160,15 @@ def _is_own(dimension: laspy.DimensionInfo) -> bool:
 
 
 def _is_octree(header: CheckedHeader, user_id: str) -> bool:
-    """Whether a record is one of COPC: they say at which byte of the file each octree cell lies,
-    which is no longer so."""
+    """Whether a record belongs to COPC: those list the byte at which each octree cell starts, which
+    changes."""
     return header.format == "copc" and user_id == "copc"
 
 
 def _check_can_be_kept(header: CheckedHeader, names: set[str]) -> None:
-    """Refuse what laspy would write other than it is."""
-    theirs = [d for d in header.las.point_format.extra_dimensions if not _is_own(d)]
-    for name in names & {d.name for d in theirs}:
+    """Refuse content that laspy would change when it writes it."""
+    foreign = [d for d in header.las.point_format.extra_dimensions if not _is_own(d)]
+    for name in names & {d.name for d in foreign}:
         raise InputError(
             f"the survey already has a dimension {name!r} that scenenet did not write",
             file=header.path,
@@ -183,7 +184,7 @@ def _check_can_be_kept(header: CheckedHeader, names: set[str]) -> None:
         )
     if header.waveforms_inside:
         raise InputError(
-            "its waveforms are inside of the file, where a prediction cannot be added to them",
+            "its waveforms are stored inside the file, so dimensions cannot be added",
             file=header.path,
             remedy="Write the points without waveforms first (pdal translate "
             "--writers.las.dataformat_id, las2las -set_point_type)",
@@ -193,9 +194,9 @@ def _check_can_be_kept(header: CheckedHeader, names: set[str]) -> None:
 def _check_channels(source: Path, channels: set[int], compressed: bool) -> None:
     if compressed and len(channels) > 1:
         raise InputError(
-            "its points have waveform packets of several scanner channels, which cannot be "
-            "compressed without mixing them up",
+            "its points have waveform packets of several scanner channels, which the compressor "
+            "would mix up",
             file=source,
-            remedy="Name a .las file for the result, or write the points without waveforms first "
+            remedy="Choose a .las file for the result, or write the points without waveforms first "
             "(pdal translate --writers.las.dataformat_id, las2las -set_point_type)",
         )

@@ -1,4 +1,4 @@
-"""The point cloud as every stage sees it."""
+"""The point cloud that every stage works with."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PointCloud:
             northing of 4 630 000 m a float32 step is half a metre.
         classification: (N,) uint8 class codes.
         scheme: what the codes mean; None if the user did not name it (it is never guessed).
-        crs: coordinate reference system; None where the file names none.
+        crs: coordinate reference system; None if the file names none.
     """
 
     xyz: np.ndarray

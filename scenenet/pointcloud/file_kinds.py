@@ -1,4 +1,4 @@
-"""What kind of point cloud a file is, by its first bytes and its name together."""
+"""The kind of a point-cloud file, from its first bytes and its suffix."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from pathlib import Path
 from scenenet.core.errors import InputError
 
 SUFFIXES = {".las": "las", ".laz": "las", ".npy": "npy", ".pt": "pt"}
-"""Suffix -> reader. COPC files end in ``.copc.laz``; whether LAS points are compressed is said
-by their header, not by the name."""
+"""Suffix -> reader. COPC files end in ``.copc.laz``; the header, not the suffix, says whether LAS
+points are compressed."""
 LFS_START = b"version https://git-lfs"
 READABLE = "Give a LAS, LAZ or COPC file (.las, .laz), or a TS40K sample (.npy, .pt)"
 OTHER_KINDS = {
@@ -28,7 +28,8 @@ def kind_of(path: str | Path) -> str:
     """``las`` (LAZ and COPC too), ``npy`` or ``pt``.
 
     Raises:
-        InputError: the file is missing, empty, of another kind, or its content and suffix differ.
+        InputError: the file is missing, empty or of another kind, or its content and suffix
+            disagree.
     """
     path = Path(path)
     _check_there(path)
@@ -43,30 +44,30 @@ def kind_of(path: str | Path) -> str:
         ) from error
     if not start:
         raise InputError(
-            "the file is empty (0 bytes)", file=path, remedy="Get it again from where it came from"
+            "the file is empty (0 bytes)", file=path, remedy="Get it again from its source"
         )
     if start.startswith(LFS_START):
         raise InputError(
-            "this is a git-LFS pointer, a small text that stands for the real file",
+            "this is a git-LFS pointer, not the file itself",
             file=path,
-            remedy="Fetch the real file: git lfs pull",
+            remedy="Download the file: git lfs pull",
         )
     by_name = SUFFIXES.get(path.suffix.lower())
     by_content = _content_kind(start)
     if by_name is None:
         though = f", though its content is {by_content}" if by_content in ("las", "npy") else ""
         raise InputError(
-            f"the suffix {path.suffix!r} is not one of a point cloud{though}",
+            f"the suffix {path.suffix!r} does not belong to a point cloud{though}",
             file=path,
             remedy=READABLE,
         )
     if by_name == "pt" and by_content in (None, "zip"):
-        return "pt"  # torch writes a zip archive, and in older versions something without a mark
+        return "pt"  # torch writes a zip archive; older versions wrote a file without a signature
     if by_content != by_name:
         raise InputError(
-            f"its name ends in {path.suffix} but its content is {_describe(start, by_content)}",
+            f"the suffix is {path.suffix}, but the content is {_describe(start, by_content)}",
             file=path,
-            remedy=f"Rename it or get it again. {READABLE}",
+            remedy=f"Rename the file, or get it again. {READABLE}",
         )
     return by_name
 

@@ -1,4 +1,4 @@
-"""Reading a survey, whatever its format: as a whole, piece by piece, or its header alone."""
+"""Read a survey of any format: whole, in chunks, or its header alone."""
 
 from __future__ import annotations
 
@@ -26,20 +26,21 @@ CHUNK_POINTS = 1_000_000
 
 @dataclass(frozen=True)
 class SurveyInfo:
-    """What a survey's header says, checked against the size of the file.
+    """The header of a survey, checked against the size of the file.
 
     Attributes:
         path: the file.
         format: ``las``, ``laz``, ``copc``, ``npy`` or ``pt``.
         version: LAS version (``"1.4"``); None for other formats.
         point_format: LAS point format 0-10; None for other formats.
-        n_points: number of points; the file has room for them.
-        mins, maxs: bounding box (x, y, z) that a LAS header claims. Points may lie outside of a
-            careless one; of .npy and .pt it is that of the points. NaN without points.
-        crs: coordinate reference system; None where none is named or understood.
+        n_points: number of points; the file is large enough for them.
+        mins, maxs: bounding box (x, y, z): for LAS the one in the header, which may be wrong, for
+            .npy and .pt that of the points. NaN without points.
+        crs: coordinate reference system; None if the file names none, or one that is not
+            understood.
         scales: step of the stored coordinates (x, y, z); None for .npy and .pt.
         extra_dimensions: names of the dimensions beyond those of the point format.
-        warnings: what is wrong with the header without standing in the way of the points.
+        warnings: defects of the header that do not prevent reading the points.
     """
 
     path: Path
@@ -89,21 +90,23 @@ def survey_info(path: str | Path) -> SurveyInfo:
 
 
 def survey_in_metres(path: str | Path) -> SurveyInfo:
-    """The header of a survey whose coordinates are metres, as far as the file says.
+    """The header of a survey whose coordinates are in metres, or whose unit is unknown.
 
-    Sizes of voxels, kernels and towers are lengths: in degrees or feet they would mean nothing.
+    Voxels, kernels and towers have sizes in metres, so degrees and feet are refused.
 
     Raises:
-        InputError: as ``survey_info``, and where the coordinates are known to be something else.
+        InputError: as ``survey_info``, and if the coordinates are known to have another unit.
     """
     info = survey_info(path)
     unit = unit_in_metres(info.crs)
-    # Only what the file says: small numbers without a CRS may be a local system in metres, and
-    # ``check`` warns of them.
+    # Only what the file states: small numbers without a CRS may be a local system in metres;
+    # ``check`` warns about them.
     degrees = info.crs is not None and info.crs.is_geographic
     if degrees or unit not in (None, 1.0):
         raise InputError(
-            "coordinates are degrees" if degrees else f"a unit of the coordinates is {unit:g} m",
+            "the coordinates are in degrees"
+            if degrees
+            else f"the unit of the coordinates is {unit:g} m, not 1 m",
             file=path,
             place=f"CRS {info.crs.name}" if info.crs else None,
             remedy="Reproject it to metres first (pdal translate --filter filters.reprojection)",
@@ -114,20 +117,20 @@ def survey_in_metres(path: str | Path) -> SurveyInfo:
 def iter_chunks(
     path: str | Path, codes: str | None = None, chunk_points: int = CHUNK_POINTS
 ) -> Iterator[PointCloud]:
-    """The points of a survey in the order of the file, a chunk at a time.
+    """The points of a survey in the order of the file, in chunks.
 
-    Memory is bounded by the chunk for LAS, LAZ and COPC. Every point comes: withheld, noise and
-    overlap points too. A survey of 0 points gives no chunk. Errors in header, name or codes come
-    with the call, not with the first chunk.
+    For LAS, LAZ and COPC, memory is bounded by a chunk. All points are included: withheld, noise
+    and overlap points too. A survey of 0 points gives no chunk. Errors in header, name or codes
+    are raised by the call, not by the first chunk.
 
     Args:
         path: LAS, LAZ, COPC, .npy or .pt file.
-        codes: class scheme (a name of ``SCHEMES``); None where nobody has said.
-        chunk_points: points in each chunk but the last.
+        codes: class scheme (a name of ``SCHEMES``); None if unknown.
+        chunk_points: points in each chunk except the last.
 
     Raises:
-        InputError: the file cannot be read as what it says it is; the message names it and says
-            why, also where the decoder hung or crashed.
+        InputError: the file cannot be read; the message names it and the reason, even if the
+            decoder hung or crashed.
     """
     if chunk_points < 1:
         raise ValueError(f"chunk_points must be at least 1, not {chunk_points}")

@@ -1,13 +1,13 @@
-"""Samples of the TS40K dataset: crops that come as numpy arrays or torch dictionaries.
+"""Samples of the TS40K dataset: crops stored as numpy arrays or torch dictionaries.
 
 - ``.npy``: (N, 4) numbers, x, y, z and the class code.
 - ``.pt``: a dictionary with ``input_pcd`` (N, 3) and ``semantic_labels`` (N,), (N, 1) or (1, N);
-  what else is in it (``type``, ``obj_boxes``) is not used.
+  further entries (``type``, ``obj_boxes``) are not used.
 
-The ``.npy`` crops carry EDP codes (tower 15). The dataset's own ``.pt`` samples are made with six
-merged classes (tower 4, power lines 5), unless their maker turned that off: codes ``ts40k``.
+The ``.npy`` crops have ``edp`` codes. The tools of the dataset write ``.pt`` samples with six
+merged classes (class scheme ``ts40k``), unless this is turned off.
 
-Neither is loaded with pickle: a sample from the internet must not run code here.
+Neither is loaded with pickle, so that a downloaded sample cannot run code.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ def read_sample(path: str | Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         kind: ``npy`` or ``pt``.
 
     Raises:
-        InputError: the file is damaged, needs pickle, or holds something else than points.
+        InputError: the file is damaged, needs pickle, or does not contain points.
     """
     path = Path(path)
     xyz, codes = _from_npy(path) if kind == "npy" else _from_pt(path)
     bad = np.flatnonzero(~np.isfinite(xyz).all(axis=1))
     if len(bad):
         raise InputError(
-            f"{len(bad)} points have a coordinate that is not a number, the first "
+            f"{len(bad)} points have a coordinate that is not a number; the first is "
             f"{xyz[bad[0]].tolist()}",
             file=path,
             place=f"row {bad[0]}",
@@ -53,30 +53,30 @@ def read_sample(path: str | Path, kind: str) -> tuple[np.ndarray, np.ndarray]:
         wrong = np.flatnonzero(~((codes >= 0) & (codes <= 255) & (codes == np.floor(codes))))
     if len(wrong):
         raise InputError(
-            f"{len(wrong)} class codes are not whole numbers from 0 to 255, the first "
+            f"{len(wrong)} class codes are not whole numbers from 0 to 255; the first is "
             f"{codes[wrong[0]]}",
             file=path,
             place=f"row {wrong[0]}",
-            remedy="The class code stands in the last column (.npy) or in semantic_labels (.pt)",
+            remedy="Put the class code in the last column (.npy) or in semantic_labels (.pt)",
         )
     return np.ascontiguousarray(xyz, dtype=np.float64), codes.astype(np.uint8)
 
 
 def _from_npy(path: Path) -> tuple[np.ndarray, np.ndarray]:
     try:
-        # Mapped, so that a header that lies about its shape is told from the size of the file.
+        # Mapped, so that a header with a wrong shape is detected from the size of the file.
         array = np.load(path, mmap_mode="r", allow_pickle=False)
-    except Exception as error:  # a damaged header makes numpy raise whatever its parser does
+    except Exception as error:  # a damaged header can make numpy raise anything
         text = _first_line(error)
         problem = f"the array cannot be read ({text})"
         if "Object arrays" in text or "Python objects" in text:
-            problem = "the array holds Python objects, which are not loaded: they can run code"
+            problem = "the array has Python objects, which are not loaded because they can run code"
         elif "mmap length" in text or "greater than file size" in text:
-            problem = f"the file is cut off: it is shorter than its array ({text})"
+            problem = f"the file is truncated: it is shorter than its array ({text})"
         raise InputError(problem, file=path, remedy=FIX_NPY) from error
     if array.dtype.kind not in "fiu":
         raise InputError(
-            f"the array holds {array.dtype} and not numbers", file=path, remedy=FIX_NPY
+            f"the array has the type {array.dtype}, not numbers", file=path, remedy=FIX_NPY
         )
     if array.ndim != 2 or array.shape[1] != 4:
         raise InputError(
@@ -90,9 +90,11 @@ def _from_pt(path: Path) -> tuple[np.ndarray, np.ndarray]:
     import torch
 
     if not isinstance(sample, dict) or not {POINTS_KEY, LABELS_KEY} <= sample.keys():
-        holds = f"a dictionary with {sorted(map(str, sample))}" if isinstance(sample, dict) else ""
+        content = (
+            f"a dictionary with {sorted(map(str, sample))}" if isinstance(sample, dict) else ""
+        )
         raise InputError(
-            f"the file holds {holds or f'a {type(sample).__name__}'}, not the dictionary of a "
+            f"the file has {content or f'a {type(sample).__name__}'}, not the dictionary of a "
             f"TS40K sample ({POINTS_KEY}, {LABELS_KEY})",
             file=path,
             remedy=FIX_PT,
@@ -101,7 +103,7 @@ def _from_pt(path: Path) -> tuple[np.ndarray, np.ndarray]:
     for key, value in ((POINTS_KEY, points), (LABELS_KEY, labels)):
         if not isinstance(value, torch.Tensor) or value.is_complex():
             raise InputError(
-                f"{key} is {type(value).__name__} and not a tensor of numbers",
+                f"{key} is a {type(value).__name__}, not a tensor of numbers",
                 file=path,
                 remedy=FIX_PT,
             )
@@ -114,7 +116,7 @@ def _from_pt(path: Path) -> tuple[np.ndarray, np.ndarray]:
     n = len(points)
     if tuple(labels.shape) not in {(n,), (n, 1), (1, n)}:
         raise InputError(
-            f"{LABELS_KEY} has the shape {tuple(labels.shape)}, not ({n},) as {POINTS_KEY} asks",
+            f"{LABELS_KEY} has the shape {tuple(labels.shape)}, not ({n},) as {POINTS_KEY}",
             file=path,
             remedy=FIX_PT,
         )
@@ -133,12 +135,13 @@ def _load_torch(path: Path) -> Any:
             return torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         raise InputError(
-            "the file asks for Python objects beyond tensors and numbers, which are not loaded: "
+            "the file has Python objects other than tensors and numbers, which are not loaded "
+            "because "
             f"they can run code ({_first_line(error)})",
             file=path,
             remedy=FIX_PT,
         ) from error
-    except Exception as error:  # torch raises whatever comes of acting on damaged instructions
+    except Exception as error:  # a damaged file can make torch raise anything
         raise InputError(
             f"the file is damaged, or torch did not write it ({_first_line(error)})",
             file=path,
@@ -147,7 +150,7 @@ def _load_torch(path: Path) -> Any:
 
 
 def _numpy_numbers() -> list[Any]:
-    """What plain numpy numbers are made of; the boxes of a sample hold some. None runs code."""
+    """Types that numpy numbers need; the boxes of a sample contain some. None can run code."""
     scalar = np.float64(0).__reduce__()[0]
     kinds = {type(np.dtype(code)) for code in "fdbhilqBHILQ?"}
     names = ["numpy.core.multiarray.scalar", "numpy._core.multiarray.scalar"]  # numpy 1 and 2
@@ -166,7 +169,7 @@ def sample_files(path: str | Path) -> list[Path]:
     """The TS40K samples at ``path``: the file itself, or those in the folder, by name.
 
     Returns:
-        an empty list where ``path`` is a survey (a LAS, LAZ or COPC file).
+        an empty list if ``path`` is a LAS, LAZ or COPC file.
 
     Raises:
         InputError: ``path`` is a folder without samples.
@@ -176,9 +179,9 @@ def sample_files(path: str | Path) -> list[Path]:
         samples = sorted(f for f in path.iterdir() if f.suffix in SAMPLE_SUFFIXES)
         if not samples:
             raise InputError(
-                "the folder holds no TS40K sample",
+                "the folder has no TS40K sample",
                 file=path,
-                remedy="Name a folder of .npy or .pt samples; surveys are named one by one",
+                remedy="Give a folder of .npy or .pt samples, or give surveys one by one",
             )
         return samples
     return [path] if path.suffix in SAMPLE_SUFFIXES else []

@@ -1,4 +1,13 @@
-"""Procedural corridor surveys with known truth (thesis 5.1), for who has no survey at hand."""
+"""Synthetic corridor surveys with known truth (thesis 5.1), for users without a survey.
+
+- ``settings``: the settings of a survey.
+- ``scene``: terrain, vegetation, towers and the line.
+- ``returns``: the points that the scanner gets from the scene.
+- ``annotation_noise``: labels as annotators assign them.
+- ``codes``: the class codes.
+- ``corridor``: a whole corridor, stretch by stretch.
+- ``survey``: the files of a survey.
+"""
 
 from __future__ import annotations
 

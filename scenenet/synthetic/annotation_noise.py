@@ -1,9 +1,9 @@
-"""How annotators label: the surroundings of a tower become tower (thesis 5.1.1).
+"""Annotation noise: annotators label the surroundings of a tower as tower (thesis 5.1.1).
 
 "Among these roughly 50% are mislabeled patches of ground. The maintenance personnel normally labels
-all 3D points near supporting towers". In the public TS40K crops that is an upright prism around the
-tower, square and along the line, 1.9 m to each side: all in it that was not on the ground already
-is tower, which takes grass and scrub at the foot, the ends of the wires and branches that reach in.
+all 3D points near supporting towers". In the public TS40K crops they label an upright prism around
+the tower, square and parallel to the line, 1.9 m to each side: everything in it except the ground
+is tower, including grass and scrub at the foot, conductor ends and branches.
 """
 
 from __future__ import annotations
@@ -21,12 +21,14 @@ HALF_SIDE_M = 1.9
 """Half the side of the prism at strength 0.5."""
 
 BROAD_M, BESIDE_FOOT_M = 0.8, 1.9
-"""Half the side of the foot from which on a tower is broad. Its prism goes so far beyond the foot,
-and the ground in it becomes tower as well: pylons have as many wrong labels as poles."""
+"""Half the side of the foot above which a tower is broad, and how far the prism of a broad tower
+extends beyond its foot. The ground in it becomes tower too: pylons have as many wrong labels as
+poles."""
 
 TAKEN = (SCRUB, TREE, LOW, TALL)
 GROUND_PATCH_M = 0.4
-"""At poles the ground itself becomes tower only beyond strength 0.5; up to this height."""
+"""Points up to this height above the ground count as ground. At poles they become tower only at
+strengths above 0.5."""
 
 
 def annotate(
@@ -38,14 +40,14 @@ def annotate(
     seed: int,
     rng: np.random.Generator,
 ) -> np.ndarray:
-    """The labels (N,) an annotator gives to points (N, 3) with classes ``truth`` (N,).
+    """The labels (N,) that an annotator assigns to points (N, 3) with true classes ``truth`` (N,).
 
     Args:
-        towers: number and tower, for each that stands near the points.
+        towers: number and tower, for each tower near the points.
         terrain: elevation of the ground, m.
-        strength: 0 the truth, 0.5 as in TS40K, 1 every tower in a wide prism with much ground.
-        seed: seed of the survey; an annotator treats both sides of a tower alike, in whichever
-            stretch they lie.
+        strength: 0: the truth; 0.5: as in TS40K; 1: every tower in a wide prism with much ground.
+        seed: seed of the survey, so that both sides of a tower are labelled alike although they are
+            in different stretches.
         rng: random numbers of this stretch.
     """
     labels = truth.copy()
@@ -69,10 +71,10 @@ def annotate(
         cos, sin = np.cos(tower.azimuth), np.sin(tower.azimuth)
         along, across = dx * cos + dy * sin - shift[0], dy * cos - dx * sin - shift[1]
         draw = rng.random(len(near))
-        beside = (np.abs(along) < half_along) & (draw < coverage)
-        inside = beside & (np.abs(across) < half_across)
-        # Wires hold on at the arms, which may be wider than the prism.
-        taken = (inside & np.isin(classes, TAKEN)) | (beside & (classes == CONDUCTOR))
+        in_slab = (np.abs(along) < half_along) & (draw < coverage)
+        inside = in_slab & (np.abs(across) < half_across)
+        # Conductors are attached to the arms, which may be wider than the prism.
+        taken = (inside & np.isin(classes, TAKEN)) | (in_slab & (classes == CONDUCTOR))
         if patch > 0:
             above = points[:, 2] - terrain.bilinear(points[:, 0], points[:, 1])
             low = inside & (above < GROUND_PATCH_M) & (classes != STRAY)

@@ -16,18 +16,20 @@ Weight = Annotated[float, Field(ge=0.0)]
 Metres = Annotated[float, Field(gt=0.0)]
 
 SHORTEST_SHARE = 0.55
-"""Towers may stand this much nearer than drawn, where the ground asks for it."""
+"""Spans may shrink to this share of their random length to keep conductors clear of the ground."""
 
 
 class SyntheticSettings(Settings):
-    """One corridor survey (thesis section 5.1): what stands in it and how it is scanned.
+    """One corridor survey (thesis section 5.1): its scene and how it is scanned.
 
-    The defaults make a medium-voltage line of poles like those of the public TS40K crops; a line of
-    transmission pylons as thesis 5.1.2 tells it takes the settings of docs/method/synthetic.md.
+    The defaults make a medium-voltage line of poles like those of the public TS40K crops. For a
+    line of transmission pylons as in thesis 5.1.2 use the settings in docs/method/synthetic.md.
     """
 
     towers: int = Field(14, ge=1, le=1_000_000, description="number of towers of the line")
-    seed: int = Field(0, ge=0, description="seed; the same settings give the same points")
+    seed: int = Field(
+        0, ge=0, description="seed of the survey; the same settings give the same points"
+    )
 
     kinds: dict[Kind, Weight] = Field(
         default={
@@ -40,7 +42,7 @@ class SyntheticSettings(Settings):
         description="weight of each kind of tower in the line",
     )
     height: tuple[Metres, Metres] = Field(
-        (14.5, 20.0), description="lowest and highest tower, m above its foot"
+        (14.5, 20.0), description="least and greatest height of a tower above its foot, m"
     )
     span: float = Field(70.0, ge=30.0, le=800.0, description="mean distance between towers, m")
     span_spread: float = Field(
@@ -49,7 +51,7 @@ class SyntheticSettings(Settings):
     circuits: Literal[1, 2] = Field(1, description="circuits of three conductors each")
     earth_wires: Literal[0, 1, 2] = Field(0, description="earth wires at the tower tops")
     bundle: Literal[1, 2, 3, 4] = Field(
-        1, description="wires of a conductor, side by side at 0.4 m; earth wires are single"
+        1, description="subconductors of a conductor, 0.4 m apart; earth wires are single"
     )
     catenary: float = Field(
         900.0,
@@ -57,13 +59,17 @@ class SyntheticSettings(Settings):
         le=5000.0,
         description="catenary parameter (tension over weight per metre), m; sag = span^2 / (8 c)",
     )
-    bend: float = Field(30.0, ge=0.0, le=60.0, description="largest turn of the line, degrees")
-    bend_share: Share = Field(0.2, description="share of the towers at which the line turns")
+    bend: float = Field(
+        30.0, ge=0.0, le=60.0, description="largest change of direction of the line, degrees"
+    )
+    bend_share: Share = Field(
+        0.2, description="share of the towers at which the line changes direction"
+    )
     other_lines: float = Field(
         14.0,
         ge=0.0,
         le=100.0,
-        description="cables of other lines that cross or run along, per km of line",
+        description="cables of other lines in the corridor, per km of line",
     )
 
     half_width: float = Field(
@@ -72,61 +78,63 @@ class SyntheticSettings(Settings):
     section: int = Field(
         4,
         ge=0,
-        description="mean number of towers between two gaps in the survey, which end at a tower as"
-        " the files of TS40K do; 0 for none",
+        description="mean number of towers between two gaps in the survey, which start and end at a"
+        " tower as in the files of TS40K; 0 for no gaps",
     )
     margin: float = Field(
-        0.5, ge=0.1, le=200.0, description="corridor beyond the last tower of a section, m"
+        0.5,
+        ge=0.1,
+        le=200.0,
+        description="length of corridor beyond the last tower before a gap, m",
     )
 
     elevation: float = Field(250.0, description="mean elevation of the ground, m")
-    relief: float = Field(
-        170.0, ge=0.0, le=500.0, description="height between valleys and hills, m"
-    )
+    relief: float = Field(170.0, ge=0.0, le=500.0, description="height of hills above valleys, m")
     roughness: float = Field(
         0.5,
         ge=0.0,
         le=1.0,
-        description="how much of the relief returns at half the wavelength (0 smooth, 1 broken)",
+        description="share of the relief repeated at half the wavelength (0 smooth, 1 rough)",
     )
-    terraces: Share = Field(0.12, description="share of the ground that is cut into terraces")
+    terraces: Share = Field(0.12, description="share of the ground with terraces")
 
     tree_cover: Share = Field(0.64, description="share of the ground that is wooded")
     conifers: Share = Field(0.4, description="share of conifers among the trees")
     tree_height: tuple[Metres, Metres] = Field((2.5, 25.0), description="height of trees, m")
     bush_cover: Share = Field(0.35, description="share of the ground with bushes")
-    hedges: Share = Field(0.3, description="share of the borders of fields that have a hedge")
+    hedges: Share = Field(0.3, description="share of field borders that have a hedge")
     low_vegetation: Share = Field(
-        0.2, description="share of the returns near open ground that grass and scrub give"
+        0.2, description="share of the returns near open ground that come from grass and scrub"
     )
     penetration: Share = Field(
         0.05,
-        description="share of the pulses that pass 5 m of crown; openings between the branches"
+        description="share of the pulses that pass through 5 m of foliage; gaps between branches"
         " let more through",
     )
     clearing: float = Field(
-        1.3, ge=0.0, description="crowns are cut back to this distance from the line, m"
+        1.3, ge=0.0, description="distance from the line to which crowns are cut back, m"
     )
     water: Share = Field(0.0, description="share of the ground that is water (class 9)")
-    roads: Share = Field(0.5, description="share of the ways that are roads")
-    rails: Share = Field(0.1, description="share of the ways that are railways")
+    roads: Share = Field(0.5, description="share of the linear ways that are roads")
+    rails: Share = Field(0.1, description="share of the linear ways that are railways")
 
     density: float = Field(
-        74.0, ge=1.0, le=500.0, description="pulses per m^2 of ground; crowns return more than one"
+        74.0,
+        ge=1.0,
+        le=500.0,
+        description="pulses per m^2 of ground; in crowns a pulse may return several points",
     )
-    swath_overlap: Share = Field(
-        0.08, description="share of the corridor that a second pass has scanned as well"
-    )
+    swath_overlap: Share = Field(0.08, description="share of the corridor that is scanned twice")
     flight_height: tuple[Metres, Metres] = Field(
         (38.0, 80.0),
-        description="lowest and highest flight above the ground, m; it is from there that things"
-        " throw shadows, and below it that most stray returns are",
+        description="least and greatest height of the flight above the ground, m; decides what is"
+        " hidden behind objects, and most stray returns are just below it",
     )
     tower_density: float = Field(
         10.5, ge=1.0, le=500.0, description="points per m^2 of surface of tower members"
     )
     wire_returns: Share = Field(
-        0.75, description="share of the scan lines that give a point on a wire"
+        0.75, description="share of the scan lines that give a point on a conductor"
     )
     ranging_noise: float = Field(
         0.025, ge=0.0, le=0.5, description="standard deviation of a point's position, m"
@@ -142,7 +150,7 @@ class SyntheticSettings(Settings):
         14.0,
         ge=0.0,
         le=200.0,
-        description="things that could pass for a tower, houses and fences, per km of line",
+        description="objects that resemble a tower, houses and fences, per km of line",
     )
     clutter_kinds: dict[Obstacle, Weight] = Field(
         default={
@@ -153,13 +161,13 @@ class SyntheticSettings(Settings):
             "crane": 0.03,
             "fence": 0.15,
         },
-        description="weight of each of them",
+        description="weight of each kind of object",
     )
 
     annotation_noise: Share = Field(
         0.5,
-        description="how generously annotators labelled the surroundings of a tower as tower;"
-        " 0 labels equal the truth, 0.5 as in TS40K",
+        description="how much of the surroundings of a tower is labelled tower: 0 labels equal the"
+        " truth, 0.5 as in TS40K, 1 most",
     )
 
     easting: float = Field(545_000.0, description="easting of the start of the line, m")
@@ -171,21 +179,23 @@ class SyntheticSettings(Settings):
         for name in ("height", "tree_height", "flight_height"):
             low, high = getattr(self, name)
             if low > high:
-                raise ValueError(f"{name}: the lowest ({low}) is above the highest ({high})")
+                raise ValueError(
+                    f"{name}: the lower limit ({low}) is above the upper limit ({high})"
+                )
         for name in ("kinds", "clutter_kinds"):
             if not sum(getattr(self, name).values()) > 0:
                 raise ValueError(f"{name}: at least one kind needs a weight above 0")
         if self.roads + self.rails > 1:
-            raise ValueError("roads and rails: together they are more than all ways")
+            raise ValueError("roads and rails: their sum is above 1")
         shortest = SHORTEST_SHARE * (self.span - 2 * self.span_spread)
         if shortest < 2 * self.half_width * math.tan(math.radians(self.bend) / 2) or shortest < 10:
             raise ValueError(
-                f"span: the shortest spans ({shortest:.0f} m) are too short for a corridor of"
-                f" {2 * self.half_width:g} m that turns by {self.bend:g} degrees"
+                f"span: the shortest possible span ({shortest:.0f} m) is too short for a corridor"
+                f" {2 * self.half_width:g} m wide that turns by {self.bend:g} degrees"
             )
         if self.section and 2 * self.margin > shortest:
             raise ValueError(
-                f"margin: {self.margin:g} m on both sides of a gap leave none in a span of"
+                f"margin: {self.margin:g} m on both sides of a gap leave no gap in a span of"
                 f" {shortest:.0f} m"
             )
         return self

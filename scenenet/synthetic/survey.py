@@ -1,4 +1,4 @@
-"""The files of a synthetic survey, written while the corridor is made."""
+"""Write the files of a synthetic survey while the corridor is generated."""
 
 from __future__ import annotations
 
@@ -25,21 +25,22 @@ def make_survey(
     progress: str | None = None,
     workers: int | None = None,
 ) -> dict[str, Any]:
-    """Make a corridor and write it as a survey, stretch by stretch.
+    """Generate a corridor and write it as a survey, stretch by stretch.
 
     Args:
-        out: LAS or LAZ file with the labels as annotated, EDP codes.
+        settings: of the survey.
+        out: LAS or LAZ file with the labels as annotated, ``edp`` codes.
         truth: the same points in the same order with the labels before annotation noise.
         towers: GeoJSON, a point per true tower: id, x, y, base, height, type.
-        progress: label under which progress is shown on stderr; None shows none.
-        workers: threads that make stretches; None for one a core. The files are the same.
+        progress: label of the progress on stderr; None shows no progress.
+        workers: threads; None for one per core. Their number does not change the files.
 
     Returns:
         Counts: points, towers, length_m, classes (code -> points), and mislabelled: the share of
-        the points labelled tower that are none.
+        mislabelled points among those labelled tower.
 
     Raises:
-        InputError: a setting or path is at fault.
+        InputError: a setting or path is invalid.
     """
     corridor = make_corridor(settings)
     stretches = corridor.stretches(workers or len(os.sched_getaffinity(0)))
@@ -47,7 +48,7 @@ def make_survey(
         stretches = track(stretches, progress, total=len(corridor))
     counts = np.zeros(256, np.int64)
     wrong = 0
-    # The line starts at the origin and a file of millimetres reaches 2000 km to each side of it.
+    # The line starts at the origin; a file with steps of 1 mm reaches 2000 km to each side of it.
     offsets = np.floor([settings.easting / 1000, settings.northing / 1000, 0.0]) * 1000
     with contextlib.ExitStack() as files:
         annotated = files.enter_context(las_stream(out, corridor.crs, offsets))
@@ -73,7 +74,8 @@ def make_survey(
 
 
 def towers_geojson(towers: list[TrueTower], epsg: int) -> dict[str, Any]:
-    """A GeoJSON feature collection with a point per tower; coordinates in the CRS it names."""
+    """A GeoJSON feature collection with a point per tower; coordinates are in the CRS that it
+    names."""
     features = []
     for tower in towers:
         properties = {

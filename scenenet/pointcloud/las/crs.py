@@ -1,4 +1,4 @@
-"""The coordinate reference system that a LAS file names, and the unit of its coordinates."""
+"""The coordinate reference system of a LAS file, and the unit of its coordinates."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
 USER = "LASF_Projection"
 RECORDS = {2112: "WKT record", 34735: "GeoTIFF keys"}
-"""Record -> what it is. WKT comes before GeoTIFF keys, as in LAS 1.4."""
+"""Id of a record -> its name. WKT has priority over GeoTIFF keys, as in LAS 1.4."""
 
 
 @dataclass(frozen=True)
 class CrsRecord:
-    """What a file says about its coordinates.
+    """What a file states about its coordinates.
 
     Attributes:
-        crs: the system; None where the file names none or one that cannot be understood.
-        problem: why a record that is there gave no system; None where all is well.
+        crs: the system; None if the file names none, or one that cannot be parsed.
+        problem: why a record gave no system; None if there is no problem.
     """
 
     crs: pyproj.CRS | None
@@ -29,12 +29,12 @@ class CrsRecord:
 
     @property
     def unit_m(self) -> float | None:
-        """Metres in one planar unit of the coordinates; None in degrees, or where unknown."""
+        """Metres in one planar unit of the coordinates; None for degrees or if unknown."""
         return unit_in_metres(self.crs)
 
 
 def unit_in_metres(crs: pyproj.CRS | None) -> float | None:
-    """Metres in one planar unit of a system; None for degrees, or where nothing is known."""
+    """Metres in one planar unit of a system; None for degrees or if unknown."""
     if crs is None or crs.is_geographic or not crs.axis_info:
         return None
     return crs.axis_info[0].unit_conversion_factor
@@ -46,7 +46,7 @@ def in_degrees(
     maxs: Sequence[float],
     scales: Sequence[float] | None,
 ) -> bool:
-    """Whether coordinates are degrees: the CRS says so or, without one, steps and range do."""
+    """Whether coordinates are degrees: according to the CRS or, without one, to steps and range."""
     if crs is not None:
         return bool(crs.is_geographic)
     if scales is None or max(scales[:2]) > 1e-5:
@@ -55,7 +55,8 @@ def in_degrees(
 
 
 def read_crs(header: laspy.LasHeader) -> CrsRecord:
-    """The system that the header's records name; a broken record is told and not raised."""
+    """The system in the header's records; a broken record is reported in ``problem``, not
+    raised."""
     import pyproj
 
     problem = None
@@ -71,5 +72,5 @@ def read_crs(header: laspy.LasHeader) -> CrsRecord:
                 if crs is not None:
                     return CrsRecord(crs, None)
                 if getattr(record, "string", None) != "":
-                    problem = problem or f"the coordinate system ({kind}) cannot be understood"
+                    problem = problem or f"the coordinate system ({kind}) cannot be parsed"
     return CrsRecord(None, problem)

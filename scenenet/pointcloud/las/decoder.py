@@ -1,14 +1,13 @@
-"""The worker that decompresses LAZ points, in a process of its own, with laspy.
+"""The worker that decompresses LAZ points with laspy, in a separate process.
 
-A damaged file can make a LAZ decoder loop for ever, panic, abort its process or ask for all the
-memory there is. Here that ends this process and nothing else: the parent
-(``scenenet.pointcloud.las.isolation``) sees it and names the file.
+A damaged file can make a LAZ decoder loop forever, panic, abort its process or allocate all memory.
+This then ends the worker alone: the parent (``isolation``) detects it and names the file.
 
-It is started with one argument, a JSON object (see ``isolation._job``), and answers on stdout with
-frames: a kind (one byte), a number (4 bytes), and what they announce.
+It is started with one argument, a JSON object (see ``isolation._job``), and writes frames to
+stdout: a kind (one byte), a number (4 bytes), and the data.
 
 - ``P`` n: n whole point records.
-- ``E`` n: n bytes of text: what the decoder did not like.
+- ``E`` n: n bytes of text: the error of the decoder.
 - ``D`` 0: all points were sent.
 
 It imports nothing of the package, so that it starts fast.
@@ -31,11 +30,11 @@ if TYPE_CHECKING:
 
 FRAME = struct.Struct("<cI")
 WATCHDOG_FACTOR = 3
-"""The parent stops a worker that stalls. Where the parent is gone, the worker's own alarm does, a
-little later: a signal with its default action, so it works inside a decoder that never comes back
-to Python."""
+"""The parent stops a worker that stalls. If the parent has ended, the worker's own alarm does so a
+little later. It is a signal with its default action, so it works inside a decoder that never
+returns to Python."""
 SLOW_IMPORTS = ("pyproj", "requests")
-"""What laspy imports where it is there and the worker has no use for: half of its start."""
+"""Optional imports of laspy that the worker does not need; they take half of its start-up time."""
 
 
 def open_points(job: Mapping[str, Any]) -> laspy.LasReader:
@@ -43,13 +42,13 @@ def open_points(job: Mapping[str, Any]) -> laspy.LasReader:
     import laspy
 
     fields = laspy.DecompressionSelection.all()
-    if job["places_only"]:  # layered files keep each field apart: the others are skipped
+    if job["places_only"]:  # layered files store each field separately, so the others are skipped
         fields = laspy.DecompressionSelection.base().decompress_z().decompress_classification()
     return laspy.open(job["path"], read_evlrs=False, decompression_selection=fields)
 
 
 def limit_memory(max_bytes: int) -> None:
-    """Let this process have ``max_bytes`` more of address space than it has now (Linux)."""
+    """Limit this process to ``max_bytes`` more address space than it has now (Linux only)."""
     statm = Path("/proc/self/statm")
     if not statm.exists():
         return
@@ -61,7 +60,7 @@ def limit_memory(max_bytes: int) -> None:
 
 
 def send_points(job: Mapping[str, Any], out: BinaryIO) -> None:
-    """Decompress piece by piece and send each piece as soon as it is there.
+    """Decompress in pieces and send each piece at once.
 
     No piece crosses the border of two chunks of ``job["chunk"]`` points.
     """
@@ -75,9 +74,9 @@ def send_points(job: Mapping[str, Any], out: BinaryIO) -> None:
             n = min(job["piece"], job["chunk"] - done % job["chunk"], total - done)
             signal.alarm(job["watchdog_s"])
             points = reader.read_points(n)
-            signal.alarm(0)  # the parent may take its time with what it gets
+            signal.alarm(0)  # the parent may process a piece for any time
             if len(points) != n:
-                raise ValueError(f"{len(points)} points where {n} should be")
+                raise ValueError(f"{len(points)} points instead of {n}")
             out.write(FRAME.pack(b"P", n))
             out.write(np.frombuffer(points.array, np.uint8).data)
             out.flush()
@@ -88,11 +87,11 @@ def send_points(job: Mapping[str, Any], out: BinaryIO) -> None:
 
 def main() -> int:
     job = json.loads(sys.argv[1])
-    # Where the parent is gone, writing ends this process without a word.
+    # If the parent has ended, writing ends this process without a message.
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     out = os.fdopen(os.dup(1), "wb", buffering=1 << 16)
-    os.dup2(2, 1)  # what a library prints must not get between the frames
+    os.dup2(2, 1)  # output of libraries must not mix with the frames
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     for name in SLOW_IMPORTS:
         sys.modules[name] = None  # type: ignore[assignment]  # as if it were not installed

@@ -1,4 +1,4 @@
-"""Dimensions that are added to points: whether LAS can hold them and their values."""
+"""Extra dimensions of points: which ones, and which values, LAS can store."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ Dimension = np.dtype | type | str | tuple[np.dtype | type | str, str]
 """Type of a dimension to add, or (type, description)."""
 TYPES = tuple(np.dtype(t) for t in ("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8"))
 TEXT_BYTES = 32
-"""Bytes for a name, and for a description."""
+"""Most bytes of a name, and of a description."""
 OWN_MARK = "scenenet:"
-"""Begins the description of dimensions that this package adds, so that it may replace its own."""
+"""Start of the description of dimensions that this package adds, so that it can replace them."""
 
 
 def new_dimensions(names: Mapping[str, Dimension], *, own: bool) -> list[laspy.ExtraBytesParams]:
-    """The dimensions ``names``; with ``own``, marked as such. Long descriptions are cut.
+    """The dimensions ``names``; ``own`` marks them with ``OWN_MARK``. Long descriptions are cut.
 
     Raises:
-        ValueError: LAS cannot hold a dimension of such a name or type.
+        ValueError: LAS cannot store a dimension with this name or type.
     """
     import laspy
 
@@ -35,29 +35,30 @@ def new_dimensions(names: Mapping[str, Dimension], *, own: bool) -> list[laspy.E
         dtype = np.dtype(kind)
         dtype = np.dtype(np.uint8) if dtype == np.bool_ else dtype.newbyteorder("<")
         if dtype not in TYPES:
-            raise ValueError(f"an extra dimension cannot hold {dtype}: take one of {TYPES}")
+            raise ValueError(f"an extra dimension cannot have the type {dtype}; use one of {TYPES}")
         if not 0 < len(name.encode()) <= TEXT_BYTES or name.lower() in taken:
             raise ValueError(
-                f"{name!r} cannot name an extra dimension: 1 to {TEXT_BYTES} bytes, and none of "
-                "the names that LAS gives its own dimensions"
+                f"{name!r} cannot be the name of an extra dimension: use 1 to {TEXT_BYTES} bytes, "
+                "and "
+                "no name of a standard LAS dimension"
             )
         text = f"{OWN_MARK} {description}" if own else description
-        told = text.encode("ascii", errors="replace")[:TEXT_BYTES].decode()
-        made.append(laspy.ExtraBytesParams(name, dtype, description=told))
+        short = text.encode("ascii", errors="replace")[:TEXT_BYTES].decode()
+        made.append(laspy.ExtraBytesParams(name, dtype, description=short))
     return made
 
 
 def checked(
     arrays: Mapping[str, np.ndarray], dimensions: list[laspy.ExtraBytesParams], n: int
 ) -> dict[str, np.ndarray]:
-    """The values of ``n`` points, in the types of their dimensions.
+    """The values of ``n`` points, converted to the types of their dimensions.
 
     Raises:
-        ValueError: values are missing, too many, of the wrong shape, or beyond their type.
+        ValueError: an array is missing, unexpected or of the wrong shape, or a value does not fit.
     """
-    promised = sorted(dimension.name for dimension in dimensions)
-    if sorted(arrays) != promised:
-        raise ValueError(f"values for {sorted(arrays)}, but promised were {promised}")
+    expected = sorted(dimension.name for dimension in dimensions)
+    if sorted(arrays) != expected:
+        raise ValueError(f"values for {sorted(arrays)}, but expected for {expected}")
     result = {}
     for dimension in dimensions:
         array, dtype = np.asarray(arrays[dimension.name]), dimension.type
@@ -67,6 +68,6 @@ def checked(
             limits = np.iinfo(dtype)
             whole = array.dtype.kind in "iub"
             if not whole or (n and not limits.min <= array.min() <= array.max() <= limits.max):
-                raise ValueError(f"{dimension.name} has values that {dtype} cannot hold")
+                raise ValueError(f"{dimension.name} has values outside the range of {dtype}")
         result[dimension.name] = array.astype(dtype)
     return result

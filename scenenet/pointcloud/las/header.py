@@ -1,8 +1,9 @@
-"""The header of a LAS or LAZ file: what laspy reads, checked against the size of the file.
+"""The header of a LAS or LAZ file, read with laspy and checked against the size of the file.
 
-laspy believes a header: a claim of a billion records is a loop of a billion steps, and a file that
-was cut off in transfer is read as fewer points without a word. So what could make it loop is looked
-at before it reads the header, and what the header claims of the points before it reads them.
+laspy trusts a header: a claim of a billion records is a loop of a billion steps, and a truncated
+    file
+is read as fewer points without a warning. So numbers that could make laspy loop are checked before
+it reads the header, and the claims about the points before it reads them.
 
 Layout of the public header block: ASPRS LAS 1.4 R15, section 2.4 (all numbers little endian).
 """
@@ -24,27 +25,28 @@ if TYPE_CHECKING:
     import laspy
 
 HEADER_SIZES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}
-"""Least header size in bytes of LAS 1.x."""
+"""Minor version of LAS 1.x -> least size of its header, bytes."""
 VLR_HEAD, EVLR_HEAD = 54, 60
 EMPTY_LAZ_BYTES = 32
-"""Most bytes behind the header of a LAZ file without points: an empty chunk table and its place."""
+"""Most bytes after the header of a LAZ file without points: an empty chunk table and its
+position."""
 FAR = 1e15
-"""No coordinate is as large, in whatever unit; float64 could not tell points apart there."""
+"""No coordinate is this large in any unit; float64 could not distinguish points there."""
 MAX_RECORDS = 256 * 2**20
-"""Most bytes of records before the points, and behind them: laspy holds them in memory."""
-GET_AGAIN = "Get the file again from where it came from, or repair it with its own software"
+"""Most bytes of records before the points, and after them: laspy keeps them in memory."""
+GET_AGAIN = "Get the file again from its source, or repair it with the software that wrote it"
 REWRITE = "Rewrite it with a LAS tool (pdal translate, las2las), or get it again"
 
 
 @dataclass(frozen=True)
 class Vlr:
-    """A variable length record as it stands in the file, before laspy interprets it.
+    """A variable length record as stored in the file, before laspy interprets it.
 
     Attributes:
         user_id: who defined it.
-        record_id: which record of theirs.
+        record_id: number of the record for this user.
         description: its text.
-        data: what it holds.
+        data: its content.
     """
 
     user_id: str
@@ -59,10 +61,10 @@ class CheckedHeader:
 
     Attributes:
         path: the file.
-        las: the header as laspy reads it; the file has room for its points.
-        vlrs: the variable length records as they are.
-        waveforms_inside: whether waveforms follow the points, and are not in a file of their own.
-        warnings: what is wrong without standing in the way of the points.
+        las: the header as laspy reads it; the file is large enough for its points.
+        vlrs: the variable length records, unchanged.
+        waveforms_inside: whether waveforms follow the points instead of being in a separate file.
+        warnings: defects that do not prevent reading the points.
     """
 
     path: Path
@@ -84,7 +86,8 @@ def read_header(path: str | Path) -> CheckedHeader:
     """Read and check the header of a LAS or LAZ file.
 
     Raises:
-        InputError: the header is not one, contradicts itself, or claims more than the file holds.
+        InputError: the header is invalid, contradicts itself, or claims more than the file
+            contains.
     """
     path = Path(path)
     warnings: list[str] = []
@@ -100,7 +103,9 @@ def read_header(path: str | Path) -> CheckedHeader:
         waveforms = las.start_of_waveform_data_packet_record if minor >= 3 else 0
         waveforms_inside = las.point_format.has_waveform_packet and 0 < waveforms < size
         if waveforms_inside:
-            warnings.append("its waveforms are in the file itself: no prediction can be added")
+            warnings.append(
+                "its waveforms are stored inside the file, so no prediction can be added"
+            )
         else:
             _check_room(path, las, las.start_of_first_evlr if las.evlrs else size, warnings)
         if las.are_points_compressed:
@@ -109,17 +114,17 @@ def read_header(path: str | Path) -> CheckedHeader:
 
 
 def _check_version(path: Path, head: bytes, size: int) -> int:
-    """Check that the header block is there; returns the minor version."""
+    """Check that the header block is complete; returns the minor version."""
     if len(head) < HEADER_SIZES[0]:
         raise InputError(
-            f"the file is cut off: it has {size} bytes and a LAS header alone has 227",
+            f"the file is truncated: it has {size} bytes, but a LAS header alone has 227",
             file=path,
             remedy=GET_AGAIN,
         )
     major, minor = head[24], head[25]
     if major != 1 or minor not in HEADER_SIZES:
         raise InputError(
-            f"its header says LAS {major}.{minor}; versions 1.0 to 1.5 can be read",
+            f"the header says LAS {major}.{minor}, but only versions 1.0 to 1.5 can be read",
             file=path,
             place="byte 24",
             remedy=REWRITE,
@@ -128,11 +133,11 @@ def _check_version(path: Path, head: bytes, size: int) -> int:
 
 
 def _check_places(path: Path, head: bytes, size: int, minor: int) -> tuple[int, int, int]:
-    """Check the size of the header, the place of the points and the number of records."""
+    """Check the size of the header, the position of the points and the number of records."""
     header_size, offset, n_vlrs = struct.unpack_from("<HII", head, 94)
     if header_size < HEADER_SIZES[minor]:
         raise InputError(
-            f"the header says it is {header_size} bytes long, which in LAS 1.{minor} is at least "
+            f"the header says that it has {header_size} bytes, but LAS 1.{minor} needs at least "
             f"{HEADER_SIZES[minor]}: the program that wrote the file did not finish it",
             file=path,
             place="byte 94",
@@ -140,7 +145,7 @@ def _check_places(path: Path, head: bytes, size: int, minor: int) -> tuple[int, 
         )
     if not header_size <= offset <= min(size, MAX_RECORDS):
         raise InputError(
-            f"the header says the points begin at byte {offset}, but the header ends at byte "
+            f"the header says that the points start at byte {offset}, but the header ends at byte "
             f"{header_size}, the file at byte {size}, and records of more than {MAX_RECORDS} bytes "
             "are not read",
             file=path,
@@ -149,7 +154,7 @@ def _check_places(path: Path, head: bytes, size: int, minor: int) -> tuple[int, 
         )
     if n_vlrs * VLR_HEAD > offset:
         raise InputError(
-            f"the header claims {n_vlrs} variable length records, which have no room in the "
+            f"the header claims {n_vlrs} variable length records, but they do not fit in the "
             f"{offset} bytes before the points",
             file=path,
             place="byte 100",
@@ -165,12 +170,12 @@ def _read_vlrs(
     preamble, at = stream.read(offset), header_size
     vlrs: list[Vlr] = []
     while len(vlrs) < claimed and at + VLR_HEAD <= offset:
-        user, record_id, length, told = struct.unpack_from("<2x16sHH32s", preamble, at)
+        user, record_id, length, text = struct.unpack_from("<2x16sHH32s", preamble, at)
         data = preamble[at + VLR_HEAD : at + VLR_HEAD + length]
         if len(data) < length:
             break
         user_id = user.split(b"\0", 1)[0].decode("latin-1")
-        vlrs.append(Vlr(user_id, record_id, told.split(b"\0", 1)[0], data))
+        vlrs.append(Vlr(user_id, record_id, text.split(b"\0", 1)[0], data))
         at += VLR_HEAD + length
     if len(vlrs) < claimed:
         warnings.append(
@@ -188,7 +193,7 @@ def _can_read_evlrs(head: bytes, size: int, minor: int, warnings: list[str]) -> 
     if not fit:
         warnings.append(
             f"the header claims {count} extended variable length records from byte {first} on, "
-            f"but the file has {size} bytes, or they are too large; they are taken as absent"
+            f"but the file has {size} bytes, or they are too large; they are ignored"
         )
     return fit
 
@@ -199,10 +204,10 @@ def _read_with_laspy(path: Path, stream: BinaryIO, read_evlrs: bool) -> laspy.La
     stream.seek(0)
     try:
         header = laspy.LasHeader.read_from(stream, read_evlrs=read_evlrs)
-        header.point_format.dtype()  # fails for two dimensions of one name
-    except Exception as error:  # laspy raises whatever comes of parsing damaged bytes
+        header.point_format.dtype()  # fails for two dimensions with the same name
+    except Exception as error:  # damaged bytes can make laspy raise anything
         raise InputError(
-            f"its header cannot be read ({type(error).__name__}: {error})",
+            f"the header cannot be read ({type(error).__name__}: {error})",
             file=path,
             remedy=REWRITE,
         ) from error
@@ -218,15 +223,15 @@ def _check_geometry(path: Path, las: laspy.LasHeader, warnings: list[str]) -> No
     ):
         if not (np.abs(values) < limit).all() or (name == "scale" and (values == 0).any()):
             raise InputError(
-                f"the coordinate {name}s in the header are {values.tolist()}: coordinates cannot "
-                "be told from them",
+                f"the coordinate {name}s in the header are {values.tolist()}, which give no "
+                "usable coordinates",
                 file=path,
                 remedy=REWRITE,
             )
     mins, maxs = las.mins, las.maxs
     if not (np.isfinite([mins, maxs]).all() and (mins <= maxs).all()):
         warnings.append(
-            f"the bounding box in the header is not one: {mins.tolist()} to {maxs.tolist()}"
+            f"the bounding box in the header is invalid: {mins.tolist()} to {maxs.tolist()}"
         )
 
 
@@ -235,7 +240,7 @@ def _check_room(path: Path, las: laspy.LasHeader, end: int, warnings: list[str])
     room, length, n_points = end - las.offset_to_point_data, las.point_format.size, las.point_count
     if n_points == 0 and room >= EMPTY_LAZ_BYTES + length:
         raise InputError(
-            f"the header claims 0 points, but {room} bytes follow where points would be: the "
+            f"the header claims 0 points, but {room} bytes follow in place of points: the "
             "program that wrote the file did not finish it",
             file=path,
             remedy=REWRITE,
@@ -245,14 +250,14 @@ def _check_room(path: Path, las: laspy.LasHeader, end: int, warnings: list[str])
     fit = max(room // length, 0)
     if n_points > fit:
         raise InputError(
-            f"the header claims {n_points} points, but the file holds only {fit}: it is cut off, "
-            "or its header is wrong",
+            f"the header claims {n_points} points, but the file has room for only {fit}: it is "
+            "truncated, or its header is wrong",
             file=path,
-            remedy=f"Get the whole file again; if {fit} points are all there are, rewrite its "
+            remedy=f"Get the whole file again; if it has only {fit} points, rewrite its "
             "header (pdal translate, las2las)",
         )
     if fit > n_points:
         warnings.append(
-            f"behind the {n_points} points of the header there are {room - n_points * length} more "
-            f"bytes, room for {fit - n_points} points that are not read"
+            f"after the {n_points} points of the header there are {room - n_points * length} more "
+            f"bytes, room for {fit - n_points} points, which are not read"
         )

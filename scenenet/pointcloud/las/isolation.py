@@ -1,4 +1,4 @@
-"""Decompression in a process of its own: what it breaks is that process, and the error names the
+"""Decompression in a separate process: a crash ends only that process, and the error names the
 file."""
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from scenenet.pointcloud.las import decoder
 from scenenet.pointcloud.las.header import CheckedHeader
 
 STALL_SECONDS = float(os.environ.get("SCENENET_STALL_SECONDS", "8"))
-"""Seconds without a single decoded point after which a file counts as one that hangs. Points come
-in pieces of a few hundred thousand, each a fraction of a second; a slow network disk may need
-more: set SCENENET_STALL_SECONDS."""
+"""Seconds without a decoded point after which the decoder counts as hung. Points arrive in pieces
+of a few hundred thousand, each within a fraction of a second. A slow network disk may need more:
+set SCENENET_STALL_SECONDS."""
 MAX_BYTES = 4 * 2**30
-"""Address space that the decoder may ask for. An honest file needs some hundred MB."""
+"""Address space that the decoder may use. An intact file needs some hundred MB."""
 PIECE_POINTS = 200_000
-"""Points decoded and handed over at once: enough to keep two cores busy with chunks of 50 000."""
+"""Points decoded and sent at once: enough to keep two cores busy with chunks of 50 000."""
 REMEDY = (
-    "Get the file again from where it came from; if it is the same there, rewrite it with another "
+    "Get the file again from its source; if it is damaged there too, rewrite it with another "
     "tool (pdal translate, las2las, laszip)"
 )
 
@@ -49,8 +49,8 @@ def _job(
 
 
 def _command(job: dict) -> list[str]:
-    # The file and not the module: the package and what it imports would cost a second. -P keeps
-    # the folder of the file off the import path.
+    # The file, not the module: importing the package would take a second. -P keeps the folder of
+    # the file off the import path.
     return [sys.executable, "-P", str(Path(decoder.__file__)), json.dumps(job)]
 
 
@@ -66,10 +66,10 @@ def decompress(
 
     Args:
         header: its checked header.
-        chunk_points: points in each array but the last.
+        chunk_points: points in each array except the last.
         places_only: only coordinates and class are needed, which is faster; other fields may be 0.
-        stall_seconds: time without a sign of life after which the process is stopped.
-        command: what to start in place of the worker.
+        stall_seconds: time without data after which the process is stopped.
+        command: command to run instead of the worker.
 
     Yields:
         (n,) structured arrays of point records as laspy has them, all of the header's points.
@@ -83,7 +83,7 @@ def decompress(
     environment = os.environ | {
         "RUST_BACKTRACE": "0",
         "RAYON_NUM_THREADS": os.environ.get("RAYON_NUM_THREADS", str(min(os.cpu_count() or 1, 4))),
-        "OPENBLAS_NUM_THREADS": "1",  # each thread that numpy never uses here would take memory
+        "OPENBLAS_NUM_THREADS": "1",  # unused threads of numpy would take memory
         "MALLOC_ARENA_MAX": "4",
     }
     with tempfile.TemporaryFile() as errors:
@@ -107,7 +107,7 @@ def _chunks(pipe: _Pipe, header: CheckedHeader, chunk_points: int) -> Iterator[n
         n = pipe.announced(b"P", done + filled)
         if not 0 < n <= size - filled:
             raise pipe.nonsense(done + filled)
-        if filled == 0:  # not before the decoder had points of the length that the header claims
+        if filled == 0:  # only after the decoder sent points of the length that the header claims
             chunk = np.empty(size, dtype)
         pipe.fill(chunk[filled : filled + n], done + filled)
         filled += n
@@ -122,7 +122,7 @@ def _count(done: int, header: CheckedHeader) -> str:
 
 
 class _Pipe:
-    """The worker's answers, read with a limit on how long nothing may come."""
+    """The output of the worker, read with a time limit between data."""
 
     def __init__(
         self, worker: subprocess.Popen, header: CheckedHeader, stall: float, errors
@@ -139,12 +139,12 @@ class _Pipe:
         self._out.close()
 
     def announced(self, kind: bytes, done: int) -> int:
-        """The number of the next frame, which has to be of that kind."""
+        """The number of the next frame, which must be of this kind."""
         got, n = decoder.FRAME.unpack(self._read(decoder.FRAME.size, done))
         if got == b"E":
             text = self._read(min(n, 10_000), done).decode(errors="replace")
             raise InputError(
-                "its compressed points cannot be decoded after "
+                "the compressed points cannot be decoded after "
                 f"{_count(done, self._header)} ({text})",
                 file=self._header.path,
                 remedy=REMEDY,
@@ -155,7 +155,7 @@ class _Pipe:
 
     def nonsense(self, done: int) -> InputError:
         return InputError(
-            f"the decoder sent something that is not points after {_count(done, self._header)}",
+            f"the decoder sent something other than points after {_count(done, self._header)}",
             file=self._header.path,
             remedy=REMEDY,
         )
@@ -173,10 +173,10 @@ class _Pipe:
         while at < len(view):
             if not self._selector.select(self._stall):
                 raise InputError(
-                    f"the decoder hung: no point for {self._stall:g} s after "
+                    f"the decoder hung: it sent no point for {self._stall:g} s after "
                     f"{_count(done, self._header)}",
                     file=self._header.path,
-                    remedy=REMEDY + ", or allow more time on a slow disk (SCENENET_STALL_SECONDS)",
+                    remedy=REMEDY + ", or set SCENENET_STALL_SECONDS higher for a slow disk",
                 )
             got = os.readv(self._fd, [view[at:]])
             if got == 0:
@@ -189,14 +189,14 @@ class _Pipe:
         code = self._worker.poll()
         self._errors.seek(0)
         lines = self._errors.read().decode(errors="replace").strip().splitlines()
-        said = f" ({lines[-1][:300]})" if lines else ""
+        output = f" ({lines[-1][:300]})" if lines else ""
         if code is not None and code < 0:
             how = f"was ended by signal {signal.Signals(-code).name}"
         else:
             how = f"ended with exit code {code}"
         return InputError(
-            f"the decoder {how} after {_count(done, self._header)}{said}: the compressed points "
-            f"are damaged, or ask for more than {MAX_BYTES // 2**30} GiB of memory",
+            f"the decoder {how} after {_count(done, self._header)}{output}: the compressed points "
+            f"are damaged, or need more than {MAX_BYTES // 2**30} GiB of memory",
             file=self._header.path,
             remedy=REMEDY,
         )

@@ -1,7 +1,6 @@
-"""Points of LAS, LAZ and COPC files as laspy's records, in chunks, with a checked header in hand.
+"""Points of LAS, LAZ and COPC files as laspy records, in chunks, given a checked header.
 
-Plain LAS is numbers at known places and is read here. Compressed points go through a decoder in a
-process of its own.
+Uncompressed points are read directly. Compressed points are decoded in a separate process.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 def iter_records(
     header: CheckedHeader, chunk_points: int, *, places_only: bool = False
 ) -> Iterator[laspy.ScaleAwarePointRecord]:
-    """The points of a file, ``chunk_points`` each but the last.
+    """The points of a file, in chunks of ``chunk_points`` except the last.
 
     Args:
         header: its checked header.
@@ -30,7 +29,7 @@ def iter_records(
         places_only: only coordinates and class are needed, which is faster; other fields may be 0.
 
     Raises:
-        InputError: the points cannot be decoded; the message says why.
+        InputError: the points cannot be decoded; the message has the reason.
     """
     import laspy
 
@@ -45,12 +44,12 @@ def iter_records(
 
 
 def coordinates(records: laspy.ScaleAwarePointRecord) -> np.ndarray:
-    """(n, 3) float64 coordinates."""
+    """(n, 3) float64 coordinates x, y, z in the unit of the file."""
     return np.column_stack([np.asarray(records[axis]) for axis in "xyz"])
 
 
 def class_codes(records: laspy.ScaleAwarePointRecord) -> np.ndarray:
-    """(n,) uint8 class codes, without the flags that share their byte in formats 0-5."""
+    """(n,) uint8 class codes, without the flags that share the byte in formats 0 to 5."""
     return np.array(records["classification"], np.uint8)
 
 
@@ -62,13 +61,13 @@ def _iter_plain(header: CheckedHeader, chunk_points: int) -> Iterator[laspy.Scal
         while left:
             try:
                 records = reader.read_points(chunk_points)
-            except ValueError:  # it ends inside a point
+            except ValueError:  # the file ends inside a point
                 records = laspy.ScaleAwarePointRecord.empty(header=reader.header)
             if len(records) < min(chunk_points, left):
                 raise InputError(
-                    f"the file became shorter while it was read: {left} points were still to come",
+                    f"the file became shorter while it was read: {left} points are missing",
                     file=header.path,
-                    remedy="Wait until it is completely written and read it again",
+                    remedy="Wait until it is completely written, then read it again",
                 )
             yield records
             left -= len(records)

@@ -1,4 +1,4 @@
-"""Writing a point cloud as a new LAS or LAZ file."""
+"""Write a point cloud as a new LAS or LAZ file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 CHUNK_POINTS = 500_000
 INT32_MAX = np.iinfo(np.int32).max
 NO_DATE = datetime.date.min
-"""Stands for no date: same points, same file. laspy would write the day on which it is run."""
+"""Means no date, so that the same points give the same file; laspy would write the current date."""
 
 
 def write_las(
@@ -32,19 +32,20 @@ def write_las(
     extra: Mapping[str, np.ndarray] | None = None,
     scale: float = 0.001,
 ) -> None:
-    """Write a cloud as LAS 1.4, point format 6; compressed where the suffix is ``.laz``.
+    """Write a cloud as LAS 1.4, point format 6; compressed if the suffix is ``.laz``.
 
-    The file appears whole or not at all.
+    The file is written whole or not at all.
 
     Args:
         path: ``.las`` or ``.laz`` file.
         cloud: points, class codes and CRS; the CRS is written as WKT.
         extra: further dimensions, name -> (N,) numbers.
-        scale: metres between two coordinates that can be told apart.
+        scale: step of the stored coordinates, m.
 
     Raises:
-        InputError: the coordinates are not finite, or too far apart for that scale.
-        ValueError: an extra dimension has the wrong length, or a name or type that LAS cannot hold.
+        InputError: the coordinates are not finite, or too far apart for the scale.
+        ValueError: an extra dimension has the wrong length, or a name or type that LAS cannot
+            store.
     """
     extra = {name: np.asarray(values) for name, values in (extra or {}).items()}
     names = {name: (values.dtype, "") for name, values in extra.items()}
@@ -72,12 +73,12 @@ def write_cloud(
 def las_stream(
     path: str | Path, crs: pyproj.CRS | None, offsets: np.ndarray, scale: float = 0.001
 ) -> Iterator[Callable[[np.ndarray, np.ndarray], None]]:
-    """Write a survey part by part, as ``write_las`` does a whole one.
+    """Write a survey in parts, otherwise as ``write_las``.
 
     Yields a function that takes the next points (N, 3) and their codes (N,).
 
     Args:
-        offsets: (3,) m; points lie within 2^31 ``scale`` of it.
+        offsets: (3,) m; points must be within 2^31 ``scale`` of it.
     """
     with open_writer(Path(path), _header(crs, offsets, scale)) as writer:
 
@@ -121,7 +122,7 @@ def _write_points(
 
 @contextlib.contextmanager
 def open_writer(path: Path, header: laspy.LasHeader) -> Iterator[laspy.LasWriter]:
-    """laspy's writer of a file that appears whole or not at all; compressed by its suffix.
+    """laspy's writer of a file that is written whole or not at all; the suffix decides compression.
 
     Raises:
         InputError: the suffix is neither ``.las`` nor ``.laz``.
@@ -131,18 +132,18 @@ def open_writer(path: Path, header: laspy.LasHeader) -> Iterator[laspy.LasWriter
     suffix = path.suffix.lower()
     if suffix not in (".las", ".laz"):
         raise InputError(
-            f"a point cloud cannot be written as {suffix or 'a file without a suffix'}",
+            f"the suffix {suffix!r} is not one of a LAS or LAZ file",
             file=path,
-            remedy="Name a .laz (compressed) or .las file",
+            remedy="Choose a .laz (compressed) or .las file",
         )
     for record in header.vlrs.get("ExtraBytesVlr"):
         for entry in record.extra_bytes_structs:
-            if entry.data_type:  # 0 is plain bytes, whose options are a count
-                # laspy takes the first point of a chunk for its least and greatest value.
+            if entry.data_type:  # 0 means plain bytes, whose options are a count
+                # laspy takes the first point of a chunk as its minimum and maximum.
                 entry.options &= ~(entry.MIN_BIT_MASK | entry.MAX_BIT_MASK)
     with (
         atomic(path) as partial,
-        # Text of other writers that is not ASCII is kept as the bytes it is.
+        # Text of other writers that is not ASCII is kept as bytes.
         laspy.open(partial, mode="w", header=header, encoding_errors="surrogateescape") as writer,
     ):
         yield writer
@@ -155,15 +156,15 @@ def _offsets(path: Path, xyz: np.ndarray, scale: float) -> np.ndarray:
         return np.zeros(3)
     mins, maxs = xyz.min(axis=0), xyz.max(axis=0)
     if not np.isfinite([mins, maxs]).all():
-        raise InputError("coordinates that are not numbers cannot be written", file=path)
-    # Whole kilometres, so that files of one area share their offsets and the stored steps agree.
+        raise InputError("some coordinates are not finite, so they cannot be written", file=path)
+    # Whole kilometres, so that files of one area have the same offsets and grid of coordinates.
     offsets = np.floor(mins / 1000) * 1000
     if ((maxs - offsets) / scale > INT32_MAX).any():
         offsets = np.floor((mins + maxs) / 2)
     if (np.maximum(maxs - offsets, offsets - mins) / scale > INT32_MAX).any():
         raise InputError(
-            f"the points are {(maxs - mins).max():g} m apart, which steps of {scale:g} m cannot "
-            "tell in a LAS file",
+            f"the points are {(maxs - mins).max():g} m apart, which is too far for steps of "
+            f"{scale:g} m in a LAS file",
             file=path,
             remedy="Remove stray points, or write with a larger scale",
         )

@@ -1,4 +1,4 @@
-"""Counts over any number of points in a bounded amount of memory."""
+"""Counts of points per cell and of duplicates, in bounded memory."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import numpy as np
 MIX = (np.uint64(0x9E3779B97F4A7C15), np.uint64(0xC2B2AE3D27D4EB4F), np.uint64(0x165667B19E3779F9))
 """Odd constants of common 64-bit hash functions."""
 BIAS = 2**30
-"""Cells are numbered from -BIAS to BIAS along each axis, so that two numbers fit into 64 bits."""
+"""Cells are numbered from -BIAS to BIAS along each axis, so that two numbers fit in 64 bits."""
 
 
 class CellCounts:
-    """Points per cell of a grid; where the cells get too many, their sides double.
+    """Points per cell of a grid; if there are too many cells, their side doubles.
 
     Attributes:
-        cell: side of a cell now, in the unit of the coordinates.
+        cell: current side of a cell, in the unit of the coordinates.
     """
 
     def __init__(self, cell: float, max_cells: int) -> None:
@@ -28,7 +28,7 @@ class CellCounts:
         return len(self._cells)
 
     def add(self, u: np.ndarray, v: np.ndarray | None = None) -> None:
-        """Count points by their (n,) coordinates along one axis or two."""
+        """Count points by their coordinates (n,) along one axis or two."""
         along_v = BIAS if v is None else self._number(v)
         cells, counts = np.unique((self._number(u) << 32) | along_v, return_counts=True)
         self._merge(np.concatenate([self._cells, cells]), np.concatenate([self._counts, counts]))
@@ -38,11 +38,11 @@ class CellCounts:
             self._merge((u_cell << 32) | v_cell, self._counts)
 
     def axis(self, axis: int) -> np.ndarray:
-        """(n_cells,) number of each cell along an axis."""
+        """(n_cells,) number of each cell along an axis (0 or 1)."""
         return (self._cells >> 32 if axis == 0 else self._cells & 0xFFFFFFFF) - BIAS
 
     def _number(self, coordinates: np.ndarray) -> np.ndarray:
-        # A stray coordinate of 1e300 is far away, and that is all one needs to know of it.
+        # Of a stray coordinate such as 1e300 it only matters that it is far away.
         cells = np.clip(np.floor(coordinates / self.cell), -BIAS, BIAS)
         return cells.astype(np.int64) + BIAS
 
@@ -51,7 +51,8 @@ class CellCounts:
         self._counts = np.bincount(inverse, weights=counts).astype(np.int64)
 
     def count_far(self, axis: int, factor: float) -> int:
-        """Points further outside of the middle 98 % along ``axis`` than ``factor`` extents."""
+        """Points that are outside the middle 98 % along ``axis`` by more than ``factor``
+        extents."""
         if not self.n_cells:
             return 0
         values, inverse = np.unique(self.axis(axis), return_inverse=True)
@@ -63,11 +64,11 @@ class CellCounts:
 
 
 class DuplicateCount:
-    """Points that share their place with an earlier one.
+    """Points with the same coordinates as an earlier one.
 
-    Places are remembered as 64-bit hashes. Where there are too many, only those with a hash below
-    a limit are, and the limit halves: a place is remembered always or never, so that the sample
-    has the duplicates of its places, all of them.
+    Places are stored as 64-bit hashes. If there are too many, only those with a hash below a limit
+    are kept, and the limit halves. A place is either always or never kept, so the sample has all
+    duplicates of its places.
     """
 
     def __init__(self, max_places: int) -> None:
@@ -80,6 +81,7 @@ class DuplicateCount:
 
     @property
     def is_sampled(self) -> bool:
+        """Whether only a sample of the places is kept."""
         self._settle()
         return self._bits > 0
 
@@ -92,7 +94,7 @@ class DuplicateCount:
         hashes = hashes[self._keeps(hashes)]
         self._waiting.append(hashes)
         self._n_waiting += len(hashes)
-        if self._n_waiting > self._max_places:  # sorting now and then is cheaper than every time
+        if self._n_waiting > self._max_places:  # sorting rarely is cheaper than sorting each time
             self._settle()
 
     def _keeps(self, hashes: np.ndarray) -> np.ndarray:
@@ -101,7 +103,7 @@ class DuplicateCount:
         return hashes >> np.uint64(64 - self._bits) == 0
 
     def _settle(self) -> None:
-        """Sort what waits into what is remembered, and forget until it fits."""
+        """Merge the waiting hashes into the stored ones, and drop hashes until they fit."""
         if not self._waiting:
             return
         known = len(self._hashes)
@@ -117,7 +119,8 @@ class DuplicateCount:
             self._hashes, self._extra = self._hashes[keep], self._extra[keep]
 
     def estimate(self, n_points: int) -> int:
-        """Points beyond the first at their place; exact unless ``is_sampled``."""
+        """Number of points with the same coordinates as an earlier one; exact unless
+        ``is_sampled``."""
         self._settle()
         extra = int(self._extra.sum())
         if self._bits == 0:

@@ -1,7 +1,7 @@
-"""What is in a survey and what is wrong with it: the first stage, and ``scenenet check``.
+"""Check a survey: its content and its defects. The first stage, and ``scenenet check``.
 
-One pass over the points, in memory that does not grow with the survey. The class densities are
-those of thesis Table 5.1.
+One pass over the points, in memory that does not grow with the survey. The class densities
+correspond to thesis Table 5.1.
 """
 
 from __future__ import annotations
@@ -33,45 +33,50 @@ METRES_IN_A_DEGREE = 111_320.0
 
 
 class CheckSettings(Settings):
-    """How a survey is checked."""
+    """Limits of the check."""
 
     density_cell: float = Field(
         2.0,
         gt=0,
-        description="side of the cells that count as covered where they hold a point, m; give "
+        description="side of the cells that count as covered if they have a point, m; use "
         "several times the distance between points",
     )
     stray_factor: float = Field(
         3.0,
         gt=0,
-        description="a point is stray when it lies further outside of the middle 98 % of the "
-        "points than this many times their extent, along any axis",
+        description="a point is stray if, along any axis, it is outside the middle 98 % of the "
+        "points by more than this many times their extent",
     )
     stray_share: float = Field(
-        0.005, ge=0, lt=0.5, description="share of points that may be stray; more are a part of it"
+        0.005,
+        ge=0,
+        lt=0.5,
+        description="largest share of stray points; more than this are part of the survey",
     )
     chunk_points: int = Field(500_000, ge=1, description="points in memory at a time")
     max_cells: int = Field(
-        2_000_000, ge=1000, description="cells remembered; beyond it they are made coarser"
+        2_000_000,
+        ge=1000,
+        description="largest number of cells; beyond it the cells become coarser",
     )
     duplicate_sample: int = Field(
         500_000,
         ge=1000,
-        description="places remembered in the search for duplicates; beyond it their share is "
-        "estimated from a sample of places",
+        description="number of places stored in the search for duplicates; beyond it, their "
+        "share is estimated from a sample of places",
     )
 
 
 @dataclass
 class Tally:
-    """What one pass over the points adds up.
+    """Counts of one pass over the points.
 
     Attributes:
         counts: (256,) points of each class code.
         mins, maxs: (3,) extent of the points themselves.
         planar, vertical: points by planar cell and by height.
-        duplicates: points at a place that another point has.
-        outside: points outside of the header's bounding box.
+        duplicates: points with the same coordinates as another.
+        outside: points outside the header's bounding box.
         bad_time: points whose GPS time is not a number.
         withheld: points marked as withheld.
         bad_returns: points whose return number is 0 or above the number of returns.
@@ -94,16 +99,16 @@ class Tally:
 def check_survey(
     path: str | Path, codes: str | None = None, settings: CheckSettings | None = None
 ) -> SurveyReport:
-    """Read a survey once and report what is in it.
+    """Read a survey once and report its content and defects.
 
     Args:
-        path: LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples, which are taken
-            together.
-        codes: class scheme of its codes; None where nobody has said: classes stay numbers.
-        settings: how to check.
+        path: LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples, which are
+            checked as one survey.
+        codes: class scheme; None if unknown, in which case classes have no names.
+        settings: limits of the check.
 
     Returns:
-        the report; what is odd but readable is among its warnings.
+        the report; defects that do not prevent reading are among its warnings.
 
     Raises:
         InputError: the survey cannot be read.
@@ -116,9 +121,9 @@ def check_survey(
     scheme = None if codes is None else class_scheme(codes)
     info = survey_info(path)
     header = read_header(path) if kind_of(path) == "las" else None
-    told = CrsRecord(None, None) if header is None else read_crs(header.las)
-    degrees = in_degrees(told.crs, info.mins, info.maxs, info.scales)
-    unit = told.unit_m or 1.0
+    record = CrsRecord(None, None) if header is None else read_crs(header.las)
+    degrees = in_degrees(record.crs, info.mins, info.maxs, info.scales)
+    unit = record.unit_m or 1.0
     cell = settings.density_cell / (METRES_IN_A_DEGREE if degrees else unit)
     tally = Tally(
         planar=CellCounts(cell, settings.max_cells),
@@ -134,12 +139,12 @@ def check_survey(
     else:
         for records in iter_records(header, settings.chunk_points):
             _add_records(tally, header.las, records)
-    return _report(info, told, degrees, unit, tally, scheme, settings)
+    return _report(info, record, degrees, unit, tally, scheme, settings)
 
 
 def _add_cloud(tally: Tally, cloud: PointCloud) -> None:
     _add(tally, cloud.xyz, cloud.classification)
-    # Adding zero makes -0.0 and 0.0, which are one place, the same bytes.
+    # Adding zero gives -0.0 and 0.0, which are the same place, the same bytes.
     tally.duplicates.add((cloud.xyz + 0.0).view(np.uint64))
 
 
@@ -171,7 +176,7 @@ def _add(tally: Tally, xyz: np.ndarray, codes: np.ndarray) -> None:
 
 
 def _count_stray(tally: Tally, settings: CheckSettings) -> int:
-    """Points far outside of where nearly all are; 0 where so many are that they are no accident."""
+    """Points far from nearly all others; 0 if they are too many to be an accident."""
     total = int(tally.counts.sum())
     if total < 100:
         return 0
@@ -181,7 +186,7 @@ def _count_stray(tally: Tally, settings: CheckSettings) -> int:
     return stray if stray <= settings.stray_share * total else 0
 
 
-def _report(info, told, degrees, unit, tally, scheme, settings) -> SurveyReport:
+def _report(info, record, degrees, unit, tally, scheme, settings) -> SurveyReport:
     n_points = int(tally.counts.sum())
     area = None
     if n_points and not degrees:
@@ -198,9 +203,9 @@ def _report(info, told, degrees, unit, tally, scheme, settings) -> SurveyReport:
         "header_maxs": _finite(np.array(info.maxs)),
         "area_m2": area,
         "density_per_m2": None if not area else n_points / area,
-        "crs": None if told.crs is None else told.crs.name,
-        "epsg": None if told.crs is None else told.crs.to_epsg(),
-        "unit": "degree" if degrees else _unit_name(told),
+        "crs": None if record.crs is None else record.crs.name,
+        "epsg": None if record.crs is None else record.crs.to_epsg(),
+        "unit": "degree" if degrees else _unit_name(record),
         "codes": None if scheme is None else scheme.name,
         "extra_dimensions": list(info.extra_dimensions),
         "duplicated_points": tally.duplicates.estimate(n_points),
@@ -212,7 +217,7 @@ def _report(info, told, degrees, unit, tally, scheme, settings) -> SurveyReport:
         "impossible_returns": tally.bad_returns if tally.has_returns else 0,
     }
     classes = class_table(tally.counts, scheme)
-    warnings = find_warnings(facts, tally.counts, scheme, told, info.warnings)
+    warnings = find_warnings(facts, tally.counts, scheme, record, info.warnings)
     return SurveyReport(facts, classes, tuple(warnings))
 
 
@@ -225,7 +230,7 @@ SUMMED = (
 def _together(
     folder: Path, reports: Sequence[SurveyReport], scheme: ClassScheme | None
 ) -> SurveyReport:
-    """The samples of a folder as one survey; ``samples`` is their number."""
+    """The report on the samples of a folder as one survey; ``samples`` is their number."""
     each = [report.facts for report in reports]
     counts = np.zeros(256, np.int64)
     for report in reports:
@@ -260,12 +265,12 @@ def _finite(values: np.ndarray) -> list[float] | None:
     return values.tolist() if np.isfinite(values).all() else None
 
 
-def _unit_name(told: CrsRecord) -> str | None:
-    if told.unit_m is None:
+def _unit_name(record: CrsRecord) -> str | None:
+    if record.unit_m is None:
         return None
     names: Iterator[str] = (
         name
         for name, metres in (("metre", 1.0), ("foot", 0.3048), ("US survey foot", 1200 / 3937))
-        if abs(told.unit_m - metres) < 1e-9
+        if abs(record.unit_m - metres) < 1e-9
     )
-    return next(names, f"{told.unit_m:g} m")
+    return next(names, f"{record.unit_m:g} m")

@@ -1,4 +1,4 @@
-"""The report on a survey: facts, class densities (thesis Table 5.1), and what to look at."""
+"""The report on a survey: facts, class densities (thesis Table 5.1) and warnings."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
 
 FLAG_BITS = 0x1F
 MANY_DUPLICATES = 0.001
-"""Share of duplicated points from which on they are worth a warning."""
+"""Share of duplicated points above which there is a warning."""
 MANY_CODES = 8
-"""Undefined codes named one by one in a warning."""
+"""Undefined codes that a warning lists one by one."""
 
 
 @dataclass(frozen=True)
 class SurveyReport:
-    """What was found.
+    """The result of a check.
 
     Attributes:
-        facts: plain numbers and names, as they go into JSON; lengths in metres where the name says
-            so, coordinates in the unit of the survey.
+        facts: plain numbers and names, as written to JSON; lengths are in metres if the name says
+            so, coordinates are in the unit of the survey.
         classes: one row per class of the scheme and per code found; columns code, class, points,
             share_percent (of all points).
-        warnings: what is odd, most important first; the survey is readable all the same.
+        warnings: defects, the most important first; the survey can be read in spite of them.
     """
 
     facts: dict[str, Any]
@@ -79,11 +79,11 @@ class SurveyReport:
 
 
 def class_table(counts: np.ndarray, scheme: ClassScheme | None) -> pd.DataFrame:
-    """Points and share of each class; the classes of the scheme that have none are there too.
+    """Points and share of each class, including the classes of the scheme without points.
 
     Args:
         counts: (256,) points of each code.
-        scheme: names of the codes; None where nobody has said what they mean.
+        scheme: names of the codes; None if unknown.
     """
     import pandas as pd
 
@@ -101,24 +101,28 @@ def find_warnings(
     facts: dict[str, Any],
     counts: np.ndarray,
     scheme: ClassScheme | None,
-    told: CrsRecord,
+    record: CrsRecord,
     from_header: Sequence[str],
 ) -> list[str]:
-    """What a person should look at before using the survey."""
+    """Defects to consider before the survey is used, as sentences."""
     warnings = list(from_header)
     if not facts["n_points"]:
         return [*warnings, "the survey has no points"]
-    if told.crs is None and told.problem is None:
-        warnings.append("no coordinate system is named; coordinates are taken as metres")
+    if record.crs is None and record.problem is None:
+        warnings.append(
+            "the file names no coordinate system; its coordinates are taken to be in metres"
+        )
     if facts["unit"] == "degree":
         warnings.append(
-            "the coordinates are degrees; towers are sought in metres: reproject the survey to a "
-            "projected system first"
+            "the coordinates are in degrees, but tower detection needs metres; reproject the "
+            "survey "
+            "to a projected system first"
         )
-    elif told.unit_m is not None and abs(told.unit_m - 1) > 1e-9:
+    elif record.unit_m is not None and abs(record.unit_m - 1) > 1e-9:
         warnings.append(
-            f"the coordinates are in {facts['unit']} and not in metres; towers are sought in "
-            "metres: reproject the survey first"
+            f"the unit of the coordinates is the {facts['unit']}, but tower detection needs "
+            "metres; "
+            "reproject the survey first"
         )
     warnings += _about_points(facts)
     if scheme is not None:
@@ -139,13 +143,13 @@ def _about_points(facts: dict[str, Any]) -> list[str]:
         about = "about " if facts["duplicates_estimated"] else ""
         warnings.append(
             f"duplicates: {about}{_points(facts['duplicated_points'])} "
-            f"({100 * facts['duplicated_points'] / n:.1f} %) at the place of another"
+            f"({100 * facts['duplicated_points'] / n:.1f} %) have the coordinates of another point"
         )
     counted = (
-        ("points_outside_header_box", "outside of the bounding box in the header"),
-        ("points_without_gps_time", "with a GPS time that is not a number (it is not used)"),
-        ("impossible_returns", "with an impossible return number (it is not used)"),
-        ("withheld_points", "marked as withheld by their producer; they are kept"),
+        ("points_outside_header_box", "outside the bounding box in the header"),
+        ("points_without_gps_time", "with a GPS time that is not a number (the time is not used)"),
+        ("impossible_returns", "with an impossible return number (the number is not used)"),
+        ("withheld_points", "marked as withheld by the producer (they are kept)"),
     )
     return warnings + [f"{_points(facts[key])} {text}" for key, text in counted if facts[key]]
 
@@ -155,23 +159,23 @@ def _about_classes(facts: dict[str, Any], counts: np.ndarray, scheme: ClassSchem
     found = np.flatnonzero(counts).tolist()
     unknown = [code for code in found if code not in scheme.classes]
     if unknown:
-        told = ", ".join(f"{code} ({_points(counts[code])})" for code in unknown[:MANY_CODES])
+        listed = ", ".join(f"{code} ({_points(counts[code])})" for code in unknown[:MANY_CODES])
         if len(unknown) > MANY_CODES:
-            told += f" and {len(unknown) - MANY_CODES} more"
+            listed += f" and {len(unknown) - MANY_CODES} more"
         hint = ""
         if all(code & 0x80 and code & FLAG_BITS in scheme.classes for code in unknown):
             real = ", ".join(str(code & FLAG_BITS) for code in unknown)
             hint = f"; they look like {real} with flags in the upper bits"
-        warnings.append(f"codes that {scheme.name} does not define: {told}{hint}")
+        warnings.append(f"class scheme {scheme.name} does not define these codes: {listed}{hint}")
     if not any(counts[code] for code in scheme.tower):
         tower = ", ".join(map(str, sorted(scheme.tower)))
         warnings.append(
-            f"no point is labelled tower (code {tower} in {scheme.name}): fine for a survey to "
-            "predict, of no use for training"
+            f"no point is labelled tower (code {tower} in {scheme.name}): the survey can be "
+            "predicted, but not used for training"
         )
     if facts["format"] == "pt" and scheme.name != "ts40k" and max(found) <= 5:
         warnings.append(
-            f"all class codes are 5 or below: TS40K's own .pt samples have six merged classes "
-            f"(tower 4), which are codes ts40k and not {scheme.name}"
+            f"all class codes are 5 or below. The .pt samples of TS40K have six merged classes "
+            f"(tower 4): use class scheme ts40k, not {scheme.name}"
         )
     return warnings

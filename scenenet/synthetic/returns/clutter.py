@@ -1,6 +1,6 @@
-"""Things that stand about and could pass for a tower, houses and fences.
+"""Clutter: objects that resemble a tower, houses and fences.
 
-Nobody classified them: as in the public TS40K crops they are low or tall returns like vegetation.
+They have no class of their own: as in the public TS40K crops they are low or tall, like vegetation.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from scenenet.synthetic.scene.towers import place, sample
 from scenenet.synthetic.settings import SyntheticSettings
 
 CLEAR_M = 6.0
-"""Distance from the towers at the ends of a strip, and from the line for what is tall."""
+"""Distance from the towers at the ends of a strip, m."""
 
 Members = np.ndarray
 
 
 def mast(rng: np.random.Generator) -> Members:
-    """A lone pole without wires."""
+    """A single pole without conductors."""
     height = rng.uniform(6.0, 14.0)
     return np.array([[0, 0, 0, 0, 0, height, 0.11, 0.06]])
 
@@ -39,7 +39,7 @@ def street_light(rng: np.random.Generator) -> Members:
 
 
 def dead_tree(rng: np.random.Generator) -> Members:
-    """A bare trunk and branches that rise from it."""
+    """A bare trunk with rising branches."""
     height = rng.uniform(6.0, 15.0)
     lean = rng.uniform(-0.08, 0.08, 2) * height
     rows = [[0, 0, 0, lean[0], lean[1], height, 0.02 * height, 0.04]]
@@ -92,7 +92,7 @@ MAKERS: Mapping[str, Callable[[np.random.Generator], Members]] = MappingProxyTyp
         "fence": fence,
     }
 )
-"""What is made of members, (M, 8) as those of towers; houses are surfaces."""
+"""Kinds that are made of members (M, 8), as towers are; houses are surfaces."""
 
 
 def clutter_points(
@@ -103,12 +103,12 @@ def clutter_points(
     settings: SyntheticSettings,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and codes (N,) of what is made of members; houses are put into ``solid``.
+    """Points (N, 3) and class codes (N,) of clutter made of members; houses are added to ``solid``.
 
-    They stand beside the line, the tall ones not below it, and clear of the ends of the strip.
+    Clutter is next to the line and keeps away from the ends of the strip.
 
     Args:
-        solid: height of roofs above the ground, m; is changed.
+        solid: height of roofs above the ground, m; changed in place.
     """
     room = strip.high - strip.low - 2 * CLEAR_M
     names = sorted(settings.clutter_kinds)
@@ -124,7 +124,7 @@ def clutter_points(
             continue
         members = MAKERS[kind](rng)
         points = sample(members, settings.tower_density * flight.solids, rng)
-        # Each point stands on the ground below it where the thing is long and low.
+        # Fences follow the ground below each point.
         foot = terrain.bilinear(np.array([x]), np.array([y]))[0]
         points = place(points, x, y, foot, rng.uniform(0, 2 * np.pi))
         points = points[strip.holds(points[:, 0], points[:, 1])]
@@ -140,7 +140,7 @@ def clutter_points(
 
 
 def _house(solid: Raster, x: float, y: float, azimuth: float, rng: np.random.Generator) -> None:
-    """Put a gabled roof at (x, y)."""
+    """Add a gabled roof at (x, y) to ``solid``."""
     half_length, half_width = rng.uniform(2.5, 6.0), rng.uniform(1.5, 4.0)
     eaves, ridge = rng.uniform(2.3, 4.0), rng.uniform(0.3, 2.0)
     node_x, node_y = solid.nodes()

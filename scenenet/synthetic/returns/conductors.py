@@ -1,4 +1,4 @@
-"""Conductors, earth wires and the cables of other lines."""
+"""Returns from conductors, earth wires and the cables of other lines."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from scenenet.synthetic.scene.strip import Strip
 from scenenet.synthetic.settings import SyntheticSettings
 
 BUNDLE_M = 0.4
-"""Distance of the wires of a bundle."""
+"""Distance between the subconductors of a bundle, m."""
 
 CABLE_SAG = 0.02
-"""Sag of the cables of other lines, over their span."""
+"""Sag of the cables of other lines as a share of their span."""
 
 
 def catenary(start: np.ndarray, end: np.ndarray, parameter: float, u: np.ndarray) -> np.ndarray:
-    """Points (N, 3) of a wire hanging between ``start`` and ``end`` (3,), at shares ``u`` of the
-    horizontal way (N,).
+    """Points (N, 3) of a conductor that hangs between ``start`` and ``end`` (3,), at shares ``u``
+    (N,) of the horizontal distance.
 
     z = c cosh((s - s0) / c) + k with the catenary parameter c = tension / weight per metre (m);
-    s0 and k follow from the two ends, which may lie at different heights.
+    s0 and k follow from the two ends, which may have different heights.
     """
     step = end - start
     length = float(np.hypot(step[0], step[1]))
@@ -34,7 +34,7 @@ def catenary(start: np.ndarray, end: np.ndarray, parameter: float, u: np.ndarray
     return np.column_stack((start[0] + u * step[0], start[1] + u * step[1], start[2] + z))
 
 
-def string_wires(
+def string_conductors(
     starts: np.ndarray,
     ends: np.ndarray,
     parameter: float,
@@ -43,12 +43,14 @@ def string_wires(
     rng: np.random.Generator,
     window: tuple[float, float] = (0.0, 1.0),
 ) -> np.ndarray:
-    """Points (N, 3) of the wires from ``starts`` to ``ends`` (W, 3), where scan lines meet them.
+    """Points (N, 3) of the conductors from ``starts`` to ``ends`` (W, 3), where scan lines cross
+    them.
 
     Args:
-        step: distance of two scan lines, m.
-        share: of the scan lines that give a point.
-        window: only this part of the way is scanned (shares of the horizontal way).
+        parameter: of the catenary, m.
+        step: distance between two scan lines, m.
+        share: share of the scan lines that give a point.
+        window: part that is scanned, as shares of the horizontal distance.
     """
     points = []
     for start, end in zip(starts, ends, strict=True):
@@ -62,8 +64,8 @@ def string_wires(
 
 
 def bundled(attachments: np.ndarray, azimuth: float, bundle: int, conductors: int) -> np.ndarray:
-    """The wires (V, 3) that hang at ``attachments`` (W, 3), m: the first ``conductors`` are
-    bundles of ``bundle`` wires, side by side and in pairs one above the other."""
+    """The ends (V, 3), m, of all wires at ``attachments`` (W, 3): the first ``conductors`` of them
+    hold bundles of ``bundle`` subconductors, next to and below each other."""
     if bundle == 1:
         return attachments
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
@@ -73,14 +75,14 @@ def bundled(attachments: np.ndarray, azimuth: float, bundle: int, conductors: in
         3: [(-half, 0.0), (half, 0.0), (0.0, -BUNDLE_M)],
         4: [(-half, 0.0), (half, 0.0), (-half, -BUNDLE_M), (half, -BUNDLE_M)],
     }[bundle]
-    wires = [
-        held + across * right + np.array([0.0, 0.0, down])
-        for held in attachments[:conductors] for across, down in places
+    ends = [
+        attachment + across * right + np.array([0.0, 0.0, down])
+        for attachment in attachments[:conductors] for across, down in places
     ]  # fmt: skip
-    return np.array([*wires, *attachments[conductors:]])
+    return np.array([*ends, *attachments[conductors:]])
 
 
-def wire_points(
+def conductor_points(
     strip: Strip,
     before: Support,
     after: Support,
@@ -89,19 +91,20 @@ def wire_points(
     settings: SyntheticSettings,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and codes (N,) of the line's own wires in a strip."""
+    """Points (N, 3) and class codes (N,) of the conductors and earth wires of the line in a
+    strip."""
     conductors = 3 * settings.circuits
     starts, ends = (
         bundled(tower.attachments, tower.azimuth, settings.bundle, conductors)
         for tower in (before, after)
     )
     window = (strip.low / span, strip.high / span)
-    points = string_wires(
+    points = string_conductors(
         starts,
         ends,
         settings.catenary,
         flight.line_step / flight.on_line,
-        flight.wires,
+        flight.conductors,
         rng,
         window,
     )
@@ -116,9 +119,9 @@ def other_cables(
     settings: SyntheticSettings,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and codes (N,) of low cables: telephone, street lights, houses.
+    """Points (N, 3) and class codes (N,) of low cables: telephone, street lights, houses.
 
-    Annotators saw to the main line alone: other cables are in 12, as all that is tall.
+    Annotators labelled the main line only: other cables are in class 12, like everything tall.
     """
     count = rng.poisson(settings.other_lines * (strip.high - strip.low) / 1000.0)
     parts = [np.empty((0, 3))]
@@ -131,7 +134,7 @@ def other_cables(
         ends = np.array([[x, y], [x, y]]) + half * np.array([[-1], [1]]) * [
             np.cos(azimuth), np.sin(azimuth)
         ]  # fmt: skip
-        # The ground is known near the strip only; beyond it the cable goes on as the slope does.
+        # The ground is known near the strip only; beyond it the cable has a random slope.
         z0 = float(terrain.bilinear(np.array([x]), np.array([y]))[0])
         height = rng.uniform(4.5, 8.5)
         tilt = rng.uniform(-0.08, 0.08) * half
@@ -140,7 +143,9 @@ def other_cables(
         for down in (0.0, 0.35)[: rng.integers(1, 3)]:
             hung = starts - [0, 0, down]
             parts.append(
-                string_wires(hung[:1], hung[1:], parameter, flight.line_step, flight.wires, rng)
+                string_conductors(
+                    hung[:1], hung[1:], parameter, flight.line_step, flight.conductors, rng
+                )
             )
     points = np.concatenate(parts)
     points = points[strip.holds(points[:, 0], points[:, 1])]

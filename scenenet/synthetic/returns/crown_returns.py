@@ -22,7 +22,7 @@ MASK = FOLIAGE - 1
 PER_Z, PER_Y, PER_X = (1 / side for side in FOLIAGE_CELL_M)
 
 
-@numba.njit(**LOOP)
+@numba.njit(inline="always", **LOOP)
 def through_crowns(scene, frame, pulse, out, n, state):  # type: ignore[no-untyped-def]
     """Follow a pulse down through everything above the ground.
 
@@ -72,7 +72,7 @@ def through_crowns(scene, frame, pulse, out, n, state):  # type: ignore[no-untyp
     return n, state, False
 
 
-@numba.njit(**LOOP)
+@numba.njit(inline="always", **LOOP)
 def _cross(scene, frame, pulse, crossing, out, n, state, returns):  # type: ignore[no-untyped-def]
     """Follow a pulse over one cell; returns n, state, the returns of the pulse so far, whether it
     ended, and the way to its next step in the cell below."""

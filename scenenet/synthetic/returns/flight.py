@@ -1,4 +1,4 @@
-"""How the helicopter flies along a section, and the scan lines that it lays over a stretch."""
+"""The flight of the helicopter along a section, and its scan lines over a stretch."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from scenenet.synthetic.settings import SyntheticSettings
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight; it keeps to these numbers for a section of the line.
+    """One flight; these numbers are constant for a section of the line.
 
     Attributes:
         number: 0, 1, ... along the line.
         height: above the ground, m.
-        offset: across, from the line, m; left is positive. It flies beside the line and sees crowns
-            and roofs from there.
-        line_step: distance of two scan lines, m.
-        pulse_step: distance of two pulses of a scan line, m.
-        skew: how far a scan line moves on while it crosses the corridor, m per m.
-        sway: movement of scan lines back and forth, m.
-        wires: share of the scan lines that give a point on a wire.
-        solids: points on towers over what the settings ask for.
-        strays: stray returns over what the settings ask for.
+        offset: distance from the line, m; left is positive. The helicopter flies next to the line
+            and sees crowns and roofs from there.
+        line_step: distance between two scan lines, m.
+        pulse_step: distance between two pulses of a scan line, m.
+        skew: how far a scan line advances while it crosses the corridor, m per m.
+        sway: amplitude of the variation of scan lines along the line, m.
+        conductors: share of the scan lines that give a point on a conductor.
+        solids: density of points on towers, over that of the settings.
+        strays: density of stray returns, over that of the settings.
         depths: stray returns deep in the crowns, over their mean.
         passes: (start, end) of each pass across the corridor, m; a second one overlaps the first.
     """
@@ -38,7 +38,7 @@ class Flight:
     pulse_step: float
     skew: float
     sway: float
-    wires: float
+    conductors: float
     solids: float
     strays: float
     depths: float
@@ -46,7 +46,7 @@ class Flight:
 
     @property
     def on_line(self) -> int:
-        """Passes that see the line itself."""
+        """Number of passes that scan the line itself."""
         return sum(start < 0.0 < end for start, end in self.passes)
 
 
@@ -55,7 +55,7 @@ def flight_of(settings: SyntheticSettings, number: int) -> Flight:
     rng = stream(settings.seed, FLIGHT, number)
     height = rng.uniform(*settings.flight_height)
     density = settings.density * np.exp(np.clip(0.13 * rng.standard_normal(), -0.3, 0.3))
-    # The faster the flight, the farther apart are its scan lines over the pulses of one line.
+    # A faster flight has scan lines that are further apart, relative to the pulses of one line.
     shape = np.exp(rng.uniform(-0.15, 0.45))
     cell = 1 / np.sqrt(density)
     width = settings.half_width
@@ -72,7 +72,7 @@ def flight_of(settings: SyntheticSettings, number: int) -> Flight:
         pulse_step=float(cell / np.sqrt(shape)),
         skew=float(rng.uniform(-0.25, 0.25)),
         sway=float(rng.uniform(0.0, 0.12)),
-        wires=float(np.clip(settings.wire_returns * rng.uniform(0.35, 1.35), 0, 1)),
+        conductors=float(np.clip(settings.wire_returns * rng.uniform(0.35, 1.35), 0, 1)),
         solids=float(np.exp(np.clip(0.35 * rng.standard_normal(), -0.35, 0.6))),
         strays=float(np.exp(np.clip(0.6 * rng.standard_normal(), -1.2, 1.2))),
         depths=float(np.exp(np.clip(0.8 * rng.standard_normal(), -2.0, 1.2))),

@@ -27,7 +27,7 @@ def elevation(ground, x, y):  # type: ignore[no-untyped-def]
     return low + (high - low) * v
 
 
-@numba.njit(**LOOP)
+@numba.njit(inline="always", **LOOP)
 def ground_return(scene, pulse, out, n, state):  # type: ignore[no-untyped-def]
     """Write the return of a pulse that reached the ground; returns the number of returns.
 

@@ -1,29 +1,30 @@
-"""What happens to a pulse of the scanner on its way down."""
+"""Constants of a pulse of the scanner on its way down."""
 
 from __future__ import annotations
 
 STEP_M = 0.36
-"""Length of a step of a pulse through the crowns, downwards."""
+"""Vertical length of a step of a pulse through the crowns, m."""
 
 MOST_RETURNS = 5
-"""Of one pulse."""
+"""Most returns of one pulse from foliage."""
 
 GOES_ON = 0.42
-"""Share of the pulses that go on behind a return from foliage."""
+"""Share of the pulses that continue after a return from foliage."""
 
 FOLIAGE = 64
-"""Side of the block of foliage, which repeats, in cells."""
+"""Side of the block of foliage, which is repeated, in cells."""
 FOLIAGE_CELL_M = (0.28, 0.4, 0.4)
-"""Its cells, along z, y, x: branches spread sideways."""
+"""Size of its cells along z, y, x, m: branches spread sideways."""
 FOLIATED = 0.42
-"""Share of a crown that has foliage; the rest lies open."""
+"""Share of a crown that has foliage; the rest is open."""
 
 CEILING_CELL_M = 4.0
-"""Cell of the map of the tallest things around: a pulse begins its way among crowns there."""
+"""Side of a cell of the map of greatest heights, at which a pulse starts its way through crowns,
+m."""
 
 GRASS_M = 0.3
-"""Low vegetation has its key points in class 3 below this height, above it in class 4."""
+"""Key points of low vegetation are in class 3 below this height, in class 4 above it, m."""
 WATER_RETURNS = 0.12
-"""Share of the pulses on water that come back."""
+"""Share of the pulses on water that return."""
 BORDER_M = 0.5
-"""Beside the border of the corridor some tall returns were left unclassified."""
+"""Within this distance of the border of the corridor, m, some tall returns are unclassified."""

@@ -1,8 +1,8 @@
-"""What a scanner in a helicopter gets back from ground, vegetation and roofs.
+"""The scanner: returns from ground, vegetation and roofs.
 
-Pulses fall in scan lines. Each comes from where the helicopter flies, down through the crowns: it
-returns from foliage that it meets, a few times at most, from a roof or wall, which ends it, or from
-the ground and what grows on it. So what lies behind a crown or a house is seen less or not at all.
+Pulses are sent in scan lines from the helicopter down through the crowns. A pulse returns from
+foliage, a few times at most, from a roof or wall, which ends it, or from the ground and its cover.
+So there are fewer points, or none, behind a crown or a house.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from scenenet.synthetic.scene.vegetation import Canopy
 from scenenet.synthetic.settings import SyntheticSettings
 
 BLOCK_PULSES = 100_000
-"""Pulses that are worked on at a time: memory does not grow with the length of a span."""
+"""Pulses per call of the compiled loops, so that memory does not grow with the length of a span."""
 
 
 class Scanner:
@@ -52,18 +52,20 @@ class Scanner:
         cover: Cover,
         key: int,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Points (N, 3) and codes (N,) of one strip.
+        """Points (N, 3) and class codes (N,) of one strip.
 
         Args:
+            strip: the ground to scan.
+            flight: the flight of this section.
             terrain: elevation of the ground, m.
-            canopy: what grows there.
-            solid: height of roofs above the ground, m; 0 where there is none. Its cells are those
-                of the canopy.
-            key: a number of this strip, for its random numbers.
+            canopy: the vegetation there.
+            solid: height of roofs above the ground, m; 0 without a roof. Same cells as the canopy.
+            cover: cover of the ground.
+            key: number of the strip, for its random numbers.
         """
         from scenenet.synthetic.returns.sweep import sweep
 
-        # How far a pulse can come from across on its way down through the tallest tree.
+        # How far a pulse can move across on its way down past the tallest object.
         tallest = np.maximum(canopy.top.values, solid.values)
         lean = (strip.half_width + abs(flight.offset)) / flight.height
         reach = lean * float(tallest.max())
@@ -79,7 +81,7 @@ class Scanner:
         lines = int((strip.last - strip.first + 2 * aside) / flight.line_step) + 2
         points, codes = [], []
         for number, (start, end) in enumerate(flight.passes):
-            # Pulses that come down outside may have met a crown inside.
+            # Pulses that reach the ground outside the strip may pass a crown inside it.
             start, end = start - reach, end + reach
             pulses = int((end - start) / flight.pulse_step) + 1
             per_block = max(1, BLOCK_PULSES // pulses)
@@ -146,6 +148,6 @@ def _ceiling(tallest: np.ndarray, raster: Raster, reach: float) -> Grid:
     r, c = raster.j - j0 * per, raster.i - i0 * per
     full[r : r + tallest.shape[0], c : c + tallest.shape[1]] = tallest
     ceiling = full.reshape(rows, per, columns, per).max(axis=(1, 3))
-    # Cells around: a pulse enters from the side.
+    # Include the cells around: a pulse enters from the side.
     size = 2 * int(np.ceil(reach / CEILING_CELL_M)) + 1
     return Grid(maximum_filter(ceiling, size), i0, j0, CEILING_CELL_M)

@@ -1,4 +1,4 @@
-"""Stray returns: in the air, most of them below the helicopter, and a few below the ground."""
+"""Stray returns: in the air, mostly below the helicopter, and a few below the ground."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from scenenet.synthetic.scene.strip import Strip
 from scenenet.synthetic.settings import SyntheticSettings
 
 NEAR_FLIGHT = 0.85
-"""Share of the strays in the air that lie below the helicopter; the rest are anywhere."""
+"""Share of the stray returns in the air that are just below the helicopter; the rest are
+anywhere."""
 
 BELOW_FLIGHT_M = 5.0
-"""They lie in a band below the path of the flight: mean distance down, and half its width."""
+"""Those below the helicopter are in a band below its path: scale of their distance down, and
+standard deviation across, m."""
 BAND_M = 3.0
 
 
@@ -25,19 +27,19 @@ def stray_points(
     settings: SyntheticSettings,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Points (N, 3) and codes (N,) of the stray returns of one strip."""
+    """Points (N, 3) and class codes (N,) of the stray returns of one strip."""
     w = strip.half_width
     count = settings.high_strays * flight.strays * strip.area
     n = rng.poisson(NEAR_FLIGHT * count)
     s = rng.uniform(strip.first, strip.last, n)
-    # Most of the band lies within the corridor; what is outside has been cut off.
+    # Points of the band outside the corridor are mirrored into it.
     t = flight.offset + BAND_M * rng.standard_normal(n)
     t = np.where(np.abs(t) > w, np.sign(t) * (2 * w - np.abs(t)), t)
     down = 0.6 * BELOW_FLIGHT_M * rng.standard_exponential(n) + 0.08 * flight.height * np.abs(
         rng.standard_normal(n)
     )
     near_x, near_y = strip.to_map(s, t)
-    # The path is straight over a stretch; it does not follow each bump of the ground.
+    # The path is straight over a stretch; it does not follow small relief.
     ends = strip.to_map(np.array([strip.low, strip.high]), np.zeros(2))
     start, end = terrain.bilinear(*ends)
     path = start + (end - start) * (s - strip.low) / (strip.high - strip.low) + flight.height

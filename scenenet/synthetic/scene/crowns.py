@@ -8,11 +8,11 @@ import numpy as np
 
 @numba.njit(nogil=True, cache=True)
 def paint(top, bottom, i, j, step, texture, xs, ys, heights, radii, lows, conifers):  # type: ignore[no-untyped-def]
-    """Raise the canopy where a plant is higher than what is there already.
+    """Raise the canopy where a plant is higher than the canopy there.
 
     Args:
-        top, bottom, texture: (rows, columns) values of rasters whose first node is (i, j) and
-            whose nodes are ``step`` metres apart.
+        top, bottom, texture: (rows, columns) values of rasters with first node (i, j) and nodes
+            ``step`` metres apart; top and bottom are changed, m.
         xs, ys, heights, radii, lows, conifers: (P,) columns of ``Plants``.
     """
     rows, columns = top.shape

@@ -1,4 +1,4 @@
-"""What the ground is covered with: grass and scrub, roads, railways, water."""
+"""The cover of the ground: grass and scrub, roads, railways, water."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ from scenenet.synthetic.scene.random_fields import Raster, field_seed, value_noi
 from scenenet.synthetic.settings import SyntheticSettings
 
 STEP_M = 0.5
-"""Cell of the cover."""
+"""Side of a cell of the cover, m."""
 
 MEADOW_M, TALLNESS_M = 30.0, 18.0
-"""Extent of meadows and of places where they are tall."""
+"""Extent of meadows, and of places where their grass is tall, m."""
 
 WAY_M = 230.0
-"""Extent of the land between two ways."""
+"""Extent of the land between two roads or railways, m."""
 
 ROAD_HALF_WIDTH_M, BED_HALF_WIDTH_M = 2.2, 2.0
 BED_HEIGHT_M, RAIL_HEIGHT_M, RAIL_M = 0.4, 0.17, 0.75
-"""Ballast bed of a railway, and its rails above it, so far from its middle."""
+"""Height of the ballast bed of a railway, of its rails above the bed, and their distance from its
+middle, m."""
 
 AROUND_TOWER_M = 2.6
-"""Nobody mows so near to a tower."""
+"""Grass is not mown within this distance of a tower, m."""
 
 WATER_M = 300.0
-"""Extent of rivers and ponds."""
+"""Extent of rivers and ponds, m."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +36,10 @@ class Cover:
     """Rasters over a stretch.
 
     Attributes:
-        grass: share of the returns near the ground that low vegetation gives.
-        tallness: how tall that is, m: its mean.
-        rise: of the bare surface above the ground, m: ballast and rails.
-        water: 1 on water.
+        grass: share of the returns near the ground that come from low vegetation.
+        tallness: mean height of low vegetation, m.
+        rise: height of the bare surface above the ground (ballast and rails), m.
+        water: 1 on water, else 0.
     """
 
     grass: Raster
@@ -48,13 +49,13 @@ class Cover:
 
 
 class GroundCover:
-    """The cover of the ground at any place, the same from whichever stretch one asks."""
+    """The cover of the ground at any place; it does not depend on the stretch."""
 
     def __init__(self, settings: SyntheticSettings) -> None:
         self._settings = settings
         self._seed = settings.seed
         x, y = np.random.default_rng(0).uniform(0, 20_000, (2, 20_000))
-        # The share of a field above a threshold is only known from a sample of it.
+        # The share of a field above a threshold is estimated from a sample of it.
         self._wet = np.quantile(self._field(x, y, "water", WATER_M), 1 - settings.water)
         kind = self._field(x, y, "way kind", 2 * WAY_M)
         self._road = np.quantile(kind, settings.roads)
@@ -72,8 +73,8 @@ class GroundCover:
         """The cover within ``bounds`` (m).
 
         Args:
-            woods: height of what grows above the ground; below it scrub is thicker.
-            feet: x and y of towers near by, m, and the share of low vegetation around them.
+            woods: height of the canopy above the ground, m; scrub is denser below it.
+            feet: x and y of nearby towers, m, and the share of low vegetation around each.
         """
         settings = self._settings
         grass, tallness, rise, water = (Raster.covering(bounds, STEP_M) for _ in range(4))
@@ -88,7 +89,8 @@ class GroundCover:
             grown = np.where(around, np.maximum(grown, share), grown)
         tall = np.clip(0.5 + 0.6 * self._field(x, y, "tallness", TALLNESS_M), 0, 1)
         mean = 0.12 + 0.8 * tall**2 + 0.35 * below
-        # Ways run where a slow field changes sign; divided by its slope that gives their distance.
+        # Roads and railways follow the zeros of a slowly varying field; the field divided by its
+        # slope is the distance to them.
         way = self._field(x, y, "way", WAY_M)
         slope = np.hypot(*np.gradient(way, STEP_M))
         distance = np.abs(way) / np.maximum(slope, 1e-4)

@@ -1,6 +1,6 @@
-"""Random numbers and noise that follow from a place and a seed, compiled.
+"""Random numbers and noise as functions of place and seed, compiled.
 
-Imported where they are used: reading settings needs no compiler.
+Imported only inside functions, so that reading settings does not load the compiler.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def next_state(state):  # type: ignore[no-untyped-def]
 
 @numba.njit(nogil=True, cache=True, inline="always")
 def uniform(state):  # type: ignore[no-untyped-def]
-    """The number in [0, 1) that belongs to ``state`` (uint64); splitmix64."""
+    """The number in [0, 1) for ``state`` (uint64); splitmix64."""
     value = state
     value ^= value >> np.uint64(30)
     value *= _MIX
@@ -35,7 +35,7 @@ def uniform(state):  # type: ignore[no-untyped-def]
 
 @numba.njit(nogil=True, cache=True, inline="always")
 def _node(i, j, seed):  # type: ignore[no-untyped-def]
-    """Number of the node (i, j), int64; neighbouring nodes come out unrelated."""
+    """Number in [0, 1) of the node (i, j), int64; neighbouring nodes are unrelated."""
     return uniform((np.uint64(i) * _X + np.uint64(j) * _Y) ^ seed)
 
 
@@ -50,7 +50,7 @@ def hash_nodes(i, j, seed):  # type: ignore[no-untyped-def]
 
 @numba.njit(nogil=True, cache=True)
 def noise_at(x, y, wavelength, seed):  # type: ignore[no-untyped-def]
-    """``noise.value_noise`` at places (N,); seed is uint64."""
+    """``random_fields.value_noise`` at places (N,); seed is uint64."""
     out = np.empty(len(x))
     i, j = np.int64(0), np.int64(0)
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
@@ -58,13 +58,13 @@ def noise_at(x, y, wavelength, seed):  # type: ignore[no-untyped-def]
     for k in range(len(x)):
         u, v = x[k] / wavelength, y[k] / wavelength
         column, row = np.int64(np.floor(u)), np.int64(np.floor(v))
-        # Places come in rows: mostly the nodes around one are those of the one before.
+        # Places are in rows, so the nodes around one are mostly those of the previous one.
         if not known or column != i or row != j:
             i, j, known = column, row, True
             a, b = _node(i, j, seed), _node(i + 1, j, seed)
             c, d = _node(i, j + 1, seed), _node(i + 1, j + 1, seed)
         u, v = u - i, v - j
-        # Quintic steps with vanishing first and second derivative at both ends: no creases.
+        # Quintic steps, whose first and second derivatives vanish at both ends: no creases.
         u = u * u * u * (u * (u * 6.0 - 15.0) + 10.0)
         v = v * v * v * (v * (v * 6.0 - 15.0) + 10.0)
         low, high = a + (b - a) * u, c + (d - c) * u

@@ -1,4 +1,4 @@
-"""Where the towers of a line stand, and the stretches of corridor between them."""
+"""The towers of a line, and the stretches of corridor between them."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from scenenet.synthetic.scene.towers import KINDS, Structure, place
 from scenenet.synthetic.settings import SHORTEST_SHARE, SyntheticSettings
 
 LINE, STRETCH, TOWER, FLIGHT, FOOT = 0, 1, 2, 3, 4
-"""First number of the key of a random stream: what it is for."""
+"""First number of the key of a random stream: its purpose."""
 
 CLEARANCE_M = 5.0
-"""Wires stay this far above the ground where the places for towers allow it."""
+"""Least height of conductors above the ground, if a place for the next tower allows it, m."""
 
 FLIGHT_TOWERS = 6
-"""A helicopter keeps its height and speed over so many towers, where the survey has no gaps."""
+"""Towers over which a flight keeps its height and speed, in a survey without gaps."""
 
 
 @dataclass(frozen=True)
 class Support:
-    """A tower as it stands, in metres from the start of the line.
+    """A tower in place, in metres from the start of the line.
 
     Attributes:
         x, y: centre of its foot.
         base: elevation of the ground there.
         height: from the foot to the top.
-        kind: see ``structures.KINDS``.
+        kind: see ``towers.KINDS``.
         azimuth: direction of the line at the tower (bisector at a bend), radians from east.
-        structure: its members, in the tower's own frame.
-        attachments: (W, 3) where its wires hold on.
+        structure: its members, in the frame of the tower.
+        attachments: (W, 3) where its conductors and earth wires are attached.
     """
 
     x: float
@@ -49,8 +49,8 @@ class Support:
 class Line:
     """The towers of a line and, around them, its stretches.
 
-    ``supports`` has one more at either end than there are towers: those two stand outside the
-    corridor and only hold the wires that leave it.
+    There is one support more at each end than there are towers: those two are outside the
+    corridor and only hold the conductors that leave it.
     """
 
     def __init__(self, settings: SyntheticSettings, terrain: Terrain) -> None:
@@ -58,7 +58,7 @@ class Line:
         rng = stream(settings.seed, LINE)
         n = settings.towers + 2
         heights = rng.uniform(*settings.height, size=n)
-        # Sorted: the order in which a file lists the kinds must not change the line.
+        # Sorted, so that the order of the kinds in a file does not change the line.
         names = sorted(settings.kinds)
         weights = np.array([settings.kinds[name] for name in names])
         kinds = rng.choice(names, size=n, p=weights / weights.sum())
@@ -81,7 +81,7 @@ class Line:
 
     @property
     def stretches(self) -> int:
-        """Number of stretches: one before the first tower, between two towers, after the last."""
+        """Number of stretches: before the first tower, between towers, after the last."""
         return len(self.spans)
 
     def support(self, k: int) -> Support:
@@ -91,17 +91,17 @@ class Line:
         height, base, azimuth = float(heights[k]), float(bases[k]), float(azimuths[k])
         x, y = map(float, nodes[k])
         structure = KINDS[kinds[k]](height, settings.circuits, settings.earth_wires)
-        held = place(structure.attachments, x, y, base, azimuth)
-        return Support(x, y, base, height, str(kinds[k]), azimuth, structure, held)
+        attachments = place(structure.attachments, x, y, base, azimuth)
+        return Support(x, y, base, height, str(kinds[k]), azimuth, structure, attachments)
 
     def _beyond(self) -> float:
-        """Of the ends of gaps, what belongs to the supports outside the corridor, m."""
+        """Length of the ends of gaps that belong to the supports outside the corridor, m."""
         margin = self._settings.margin
         return float(sum(min(margin, 0.45 * self.spans[k]) for k in (0, -1)))
 
     def strips(self, k: int) -> list[Strip]:
         """Ground of stretch ``k``, between supports k and k + 1: all of it, or at a gap of the
-        survey what lies near its towers."""
+        survey the parts near its towers."""
         span, last = float(self.spans[k]), self.stretches - 1
         if not self._gap[k]:
             return [self._strip(k, 0.0, span)]
@@ -120,8 +120,8 @@ class Line:
             azimuth=float(self.headings[k]),
             low=low,
             high=high,
-            # Where the line turns left, the left side of both stretches is the shorter one. Gaps
-            # are cut straight.
+            # Where the line turns left, the left side of both stretches is shorter. Gaps have
+            # straight ends.
             k0=float(self._half_turns[k]) if low == 0.0 else 0.0,
             k1=-float(self._half_turns[k + 1]) if high == self.spans[k] else 0.0,
             half_width=self._settings.half_width,
@@ -131,9 +131,9 @@ class Line:
 def _sections(
     n: int, settings: SyntheticSettings, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Number of the flight (n,) that scanned each stretch, and whether (n,) it is a gap.
+    """Number (n,) of the flight that scanned each stretch, and whether (n,) it is a gap.
 
-    The stretches before the first and behind the last tower are gaps: the survey ends there.
+    The stretches before the first and after the last tower are gaps: the survey ends there.
     """
     flight, gap = np.zeros(n, int), np.zeros(n, bool)
     gap[[0, -1]] = True
@@ -141,7 +141,7 @@ def _sections(
     left, number = 0, -1
     for k in range(n):
         if left == 0:
-            # A section has two towers or more: they stand at its ends.
+            # A section has two towers or more, with one at each end.
             left = int(rng.integers(max(2, mean // 2), max(3, mean + mean // 2 + 1)))
             number += 1
             gap[k] |= settings.section > 0
@@ -152,7 +152,7 @@ def _sections(
 
 def _headings(n: int, settings: SyntheticSettings, rng: np.random.Generator) -> np.ndarray:
     """Direction (n,) of each span, radians: straight runs around one main direction, so that a
-    line never meets itself."""
+    line never crosses itself."""
     most = np.radians(settings.bend) / 2
     deviation = np.empty(n)
     current = 0.0
@@ -172,8 +172,8 @@ def _walk(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places (n, 2) of the supports, m, and the elevation of their feet (n,).
 
-    Of some distances around the mean span the first is taken at which the wires stay clear of the
-    ground, as a surveyor would; else the best.
+    Of several random spans it takes the first at which the conductors stay clear of the ground, as
+    a surveyor would, or else the one with the most clearance.
     """
     nodes, bases = np.zeros((len(heights), 2)), np.empty(len(heights))
     bases[0] = terrain.height(np.zeros(1), np.zeros(1))[0]
@@ -185,7 +185,7 @@ def _walk(
         x = nodes[k, 0] + s * np.cos(heading)
         y = nodes[k, 1] + s * np.sin(heading)
         ground = terrain.height(x, y)
-        # The lowest conductor holds on at about 0.7 of the height of a pylon and higher on a pole.
+        # The lowest conductor is attached at about 0.7 of the height of a pylon, higher on a pole.
         first, last = bases[k] + 0.7 * heights[k], ground[:, -1:] + 0.7 * heights[k + 1]
         sag = s * (lengths[:, None] - s) / (2 * settings.catenary)
         clearance = (first + (last - first) * u - sag - ground).min(axis=1)

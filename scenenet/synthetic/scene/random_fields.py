@@ -1,8 +1,8 @@
-"""Seeded noise that has a value at every place of the plane, without any state.
+"""Random fields: noise with a value at every place of the plane, without state.
 
-A corridor is made stretch by stretch. What both sides of a border must agree on (the ground, where
-a tree stands) is a function of the place and the seed alone, so that a line of any length costs
-linear time and bounded memory.
+A corridor is generated stretch by stretch. Both sides of a border must agree on the ground and the
+trees, so these are functions of place and seed alone. A line of any length then takes linear time
+and bounded memory.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ def hash01(i: np.ndarray, j: np.ndarray, seed: int) -> np.ndarray:
 
 
 def value_noise(x: np.ndarray, y: np.ndarray, wavelength: float, seed: int) -> np.ndarray:
-    """Smooth noise in [-1, 1]: random values at nodes ``wavelength`` metres apart, faded between.
+    """Smooth noise in [-1, 1]: random values at nodes ``wavelength`` metres apart, interpolated
+    between them.
 
     Args:
         x, y: places, m, both of the same shape.
-        wavelength: distance of the nodes, m.
-        seed: chooses the field.
+        wavelength: distance between nodes, m.
+        seed: of the field.
     """
     from scenenet.synthetic.scene.hashing import noise_at
 
@@ -36,7 +37,7 @@ def value_noise(x: np.ndarray, y: np.ndarray, wavelength: float, seed: int) -> n
 
 
 def stream(seed: int, *key: int) -> np.random.Generator:
-    """The random generator that belongs to ``key`` (which part, which stretch) of a seed."""
+    """The random generator for ``key`` (purpose, number of the stretch) of a seed."""
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
 
 
@@ -49,12 +50,12 @@ def field_seed(seed: int, name: str) -> int:
 
 @dataclass(frozen=True)
 class Raster:
-    """Values on a grid whose nodes lie at whole multiples of ``step``, so that rasters of
-    neighbouring stretches share their nodes.
+    """Values on a grid whose nodes are at integer multiples of ``step``, so that rasters of
+    neighbouring stretches share nodes.
 
     Attributes:
-        i, j: index of the first column (x) and row (y); the node lies at (i step, j step).
-        step: distance of nodes, m.
+        i, j: index of the first column (x) and row (y); this node is at (i step, j step).
+        step: distance between nodes, m.
         values: (rows along y, columns along x).
     """
 
@@ -65,7 +66,7 @@ class Raster:
 
     @classmethod
     def covering(cls, bounds: tuple[float, float, float, float], step: float) -> Raster:
-        """Zeros over ``bounds`` (x min, y min, x max, y max; m), one node to spare on each side."""
+        """Zeros over ``bounds`` (x min, y min, x max, y max; m), with a spare node on each side."""
         i, j = int(np.floor(bounds[0] / step)) - 1, int(np.floor(bounds[1] / step)) - 1
         columns = int(np.ceil(bounds[2] / step)) + 2 - i
         rows = int(np.ceil(bounds[3] / step)) + 2 - j
@@ -86,7 +87,7 @@ class Raster:
         return row.clip(0, rows - 1) * columns + column.clip(0, columns - 1)
 
     def bilinear(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Value between the nodes at each place (N,)."""
+        """Bilinear value (N,) at each place (N,)."""
         u, v = x / self.step, y / self.step
         column, row = np.floor(u), np.floor(v)
         u -= column

@@ -1,4 +1,4 @@
-"""The ground that one stretch of a survey covers."""
+"""The ground of one stretch of a survey."""
 
 from __future__ import annotations
 
@@ -12,10 +12,17 @@ Numbers = np.ndarray | float
 
 @dataclass(frozen=True)
 class Strip:
-    """|t| <= half_width and low + t k0 <= s <= high + t k1.
+    """The places with |t| <= half_width and low + t k0 <= s < high + t k1.
 
-    s runs along the span from its first tower, t to its left; borders at bends follow the bisector,
-    so that stretches neither overlap nor leave gaps.
+    s is the distance along the span from its first tower, t that to the left of it, both m. Borders
+    at bends follow the bisector, so that stretches neither overlap nor leave gaps.
+
+    Attributes:
+        x, y: first tower of the span, m.
+        azimuth: direction of the span, radians from east.
+        low, high: start and end of the strip on the line, m.
+        k0, k1: slopes ds/dt of the borders at the start and the end.
+        half_width: m.
     """
 
     x: float
@@ -28,28 +35,28 @@ class Strip:
     half_width: float
 
     def holds(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Which places (N,) on the map lie in the strip."""
+        """(N,) bool: which places on the map are in the strip."""
         s, t = self.to_strip(x, y)
         between = (s >= self.low + t * self.k0) & (s < self.high + t * self.k1)
         return between & (np.abs(t) <= self.half_width)
 
     @property
     def area(self) -> float:
-        """m^2."""
+        """Area, m^2."""
         return 2 * self.half_width * (self.high - self.low)
 
     @property
     def first(self) -> float:
-        """Least s of any place in it."""
+        """Least s of any place in the strip."""
         return self.low - abs(self.k0) * self.half_width
 
     @property
     def last(self) -> float:
-        """Greatest s of any place in it."""
+        """Greatest s of any place in the strip."""
         return self.high + abs(self.k1) * self.half_width
 
     def scatter(self, n: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        """x and y of about ``n`` places, uniform over the strip."""
+        """x and y of about ``n`` random places, uniform over the strip."""
         w = self.half_width
         n_box = rng.poisson(n * (self.last - self.first) / (self.high - self.low))
         s = self.first + (self.last - self.first) * rng.random(n_box)
@@ -58,18 +65,18 @@ class Strip:
         return self.to_map(s[keep], t[keep])
 
     def to_map(self, s: Numbers, t: Numbers) -> tuple[Any, Any]:
-        """x and y on the map of places given along and across the line; numbers or arrays."""
+        """x and y on the map of places (s, t); numbers or arrays."""
         cos, sin = np.cos(self.azimuth), np.sin(self.azimuth)
         return self.x + s * cos - t * sin, self.y + s * sin + t * cos
 
     def to_strip(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Way along (s) and across (t, to the left) the line of places on the map (N,)."""
+        """s and t of places (N,) on the map."""
         cos, sin = np.cos(self.azimuth), np.sin(self.azimuth)
         dx, dy = x - self.x, y - self.y
         return dx * cos + dy * sin, dy * cos - dx * sin
 
     def bounds(self, reach: float = 0.0) -> tuple[float, float, float, float]:
-        """x min, y min, x max, y max of the strip, ``reach`` metres wider."""
+        """x min, y min, x max, y max of the strip, extended by ``reach`` metres."""
         w = self.half_width
         t = np.array([-w, w, -w, w])
         s = np.array([self.low, self.low, self.high, self.high])

@@ -1,4 +1,4 @@
-"""The ground: a smooth, seeded height field that has a value everywhere."""
+"""The ground: a smooth random height field, defined everywhere."""
 
 from __future__ import annotations
 
@@ -8,35 +8,35 @@ from scenenet.synthetic.scene.random_fields import Raster, blend, field_seed, va
 from scenenet.synthetic.settings import SyntheticSettings
 
 STEP_M = 1.0
-"""Distance of the nodes between which the ground is bilinear."""
+"""Distance between nodes; the ground is bilinear between them, m."""
 
 LONGEST_M = 280.0
 """Wavelength of the hills."""
 
 OCTAVES = 8
-"""Each at half the wavelength of the one before: 280 m down to about 2 m."""
+"""Number of octaves, each at half the wavelength of the previous one: 280 m down to about 2 m."""
 
 TERRACE_M = 1.6
-"""Height of a terrace's step."""
+"""Height of the step of a terrace, m."""
 
 RISER = 0.25
-"""Share of the climb that a terrace leaves as a slope, the wall; the rest is level."""
+"""Share of a terrace's height range that is the sloping wall; the rest is level."""
 
 TERRACED_M = 110.0
-"""Extent of the parts of the ground that are terraced."""
+"""Extent of terraced areas, m."""
 
 
 class Terrain:
     """Elevation of the ground, m, at any place (x, y in metres from the start of the line).
 
-    Octaves of value noise (fractal noise): the first carries the hills, each next one a share
-    ``roughness`` of the one before, at half the wavelength.
+    Octaves of value noise (fractal noise): the first makes the hills, each further one has half the
+    wavelength of the previous one and a share of its amplitude that depends on ``roughness``.
     """
 
     def __init__(self, settings: SyntheticSettings) -> None:
         self._elevation = settings.elevation
-        # At roughness 0.5 amplitude falls as the wavelength does: slopes of equal steepness at
-        # every scale. The range used keeps the ground walkable at 1.
+        # At roughness 0.5 the amplitude falls about as the wavelength does, so slopes are equally
+        # steep at every scale. The range keeps the ground walkable at roughness 1.
         persistence = 0.25 + 0.3 * settings.roughness
         amplitudes = persistence ** np.arange(OCTAVES)
         self._amplitudes = 0.5 * settings.relief * amplitudes / amplitudes.sum()
@@ -46,7 +46,8 @@ class Terrain:
         self._terrace_level = self._level(settings.terraces)
 
     def _level(self, share: float) -> float:
-        """Where the field of terraces is above this, which is ``share`` of the plane, they are."""
+        """Level that the field of terraces exceeds on ``share`` of the plane; terraces are
+        there."""
         if share == 0:
             return np.inf
         x, y = np.random.default_rng(0).uniform(0, 12_000, (2, 20_000))
@@ -61,7 +62,7 @@ class Terrain:
         return z if np.isinf(self._terrace_level) else self._terraced(x, y, z)
 
     def _terraced(self, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Elevations ``z`` with level steps, where terraces are."""
+        """Elevations ``z`` with level steps in terraced areas."""
         mask = value_noise(x, y, TERRACED_M, self._terrace_seed) - self._terrace_level
         steps = np.floor(z / TERRACE_M)
         climb = np.clip((z / TERRACE_M - steps - (1 - RISER)) / RISER, 0, 1)
@@ -71,14 +72,14 @@ class Terrain:
     def raster(self, bounds: tuple[float, float, float, float]) -> Raster:
         """The ground over ``bounds`` (x min, y min, x max, y max; m) for many look-ups.
 
-        ``raster(...).bilinear(x, y)`` equals ``height(x, y)``, whatever the bounds.
+        ``raster(...).bilinear(x, y)`` equals ``height(x, y)`` for any bounds.
         """
         raster = Raster.covering(bounds, STEP_M)
         raster.values[:] = self._node(*raster.nodes())
         return raster
 
     def height(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Elevation (N,) at a few places (N,) anywhere."""
+        """Elevation (N,) at places (N,), m; efficient for a few places."""
         u, v = np.asarray(x, float) / STEP_M, np.asarray(y, float) / STEP_M
         i, j = np.floor(u), np.floor(v)
         v00, v10, v01, v11 = (

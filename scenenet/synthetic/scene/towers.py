@@ -1,8 +1,8 @@
-"""Towers as members (bars, tubes, strings), and the points a scanner gets from them.
+"""Towers as members (bars, tubes, strings), and points on members.
 
-In a tower's own frame x runs along the cross-arms, y along the line, z up; the origin is the centre
+In the frame of a tower x is along the cross-arms, y along the line, z up; the origin is the centre
 of the foot. To add a kind of tower, write a function (height, circuits, earth_wires) -> Structure,
-list it in ``KINDS`` and name it in ``settings.Kind``.
+add it to ``KINDS`` and its name to ``settings.Kind``.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from types import MappingProxyType
 import numpy as np
 
 BELOW_GROUND_M = 1.5
-"""How far legs go on below the foot, so that none hangs in the air on a slope."""
+"""Length of the legs below the foot, so that none ends in the air on a slope, m."""
 
 EARTH_WIRES_APART_M = 1.2
-"""Half the distance of two earth wires."""
+"""Half the distance between two earth wires, m."""
 
 
 @dataclass(frozen=True)
 class Structure:
-    """A tower in its own frame.
+    """A tower in its frame.
 
     Attributes:
-        members: (M, 8): both ends (x, y, z, x, y, z; m) and the radius at each of them (m).
-        attachments: (W, 3), m: where wires hold on. The conductors of a circuit from left to right
-            (two circuits: left side from below, then right side), then the earth wires.
+        members: (M, 8): both ends (x, y, z, x, y, z; m) and the radius at each end (m).
+        attachments: (W, 3), m: where wires are attached. The conductors of a circuit from left to
+            right (two circuits: left side upwards, then right side), then the earth wires.
         half_base: half the side of the foot, m.
     """
 
@@ -37,7 +37,7 @@ class Structure:
 
 
 class _Frame:
-    """Collects members."""
+    """Collects the members of a tower."""
 
     def __init__(self) -> None:
         self._rows: list[tuple[float, ...]] = []
@@ -90,7 +90,7 @@ def _hang(
 
 
 def _earth(frame: _Frame, height: float, earth_wires: int) -> list[tuple[float, float, float]]:
-    """Where earth wires hold on: the top, or both ends of a beam there."""
+    """Attachments of the earth wires: the top, or both ends of a beam there."""
     if earth_wires < 2:
         return [(0.0, 0.0, height)] * earth_wires
     apart = EARTH_WIRES_APART_M
@@ -101,9 +101,9 @@ def _earth(frame: _Frame, height: float, earth_wires: int) -> list[tuple[float, 
 def _pole_head(
     frame: _Frame, height: float, circuits: int, earth_wires: int, reach: float, drop: float
 ) -> list[tuple[float, float, float]]:
-    """Cross-arms of a pole: a triangle for one circuit, three storeys for two."""
+    """Cross-arms of a pole: a triangle for one circuit, three levels for two."""
     top = height - (1.0 if earth_wires else 0.0)
-    # Pins or short strings: the lower conductors ride just above their arm.
+    # Pins or short strings: the lower conductors are just above their arm.
     pin = 0.2
     if circuits == 1:
         arm = top - drop
@@ -126,7 +126,7 @@ def lattice(height: float, circuits: int, earth_wires: int) -> Structure:
     base, waist, shoulder = 0.06 * height, 0.024 * height, 0.016 * height
     peak = 0.94 * height
     panels = max(4, round(height / 3.5))
-    # Panels shorten upwards with the width of the body.
+    # Panels become shorter upwards, like the width of the body.
     levels = peak * (1 - (1 - np.linspace(0, 1, panels + 1)) ** 1.25)
     waist_z = 0.65 * height
     halves = np.interp(levels, [0, waist_z, peak], [base, waist, shoulder])
@@ -152,7 +152,7 @@ def lattice(height: float, circuits: int, earth_wires: int) -> Structure:
 
 
 def lattice_pole(height: float, circuits: int, earth_wires: int) -> Structure:
-    """A slender braced column, 0.7 m at the foot, as medium-voltage lines have them."""
+    """A slender braced column, 0.7 m wide at the foot, as used for medium-voltage lines."""
     frame = _Frame()
     levels = np.linspace(0, height, max(6, round(height / 1.3)) + 1)
     halves = np.linspace(0.35, 0.17, len(levels))
@@ -183,7 +183,7 @@ def wooden(height: float, circuits: int, earth_wires: int) -> Structure:
 
 
 def h_frame(height: float, circuits: int, earth_wires: int) -> Structure:
-    """Two poles, a beam across them and an X between them; conductors side by side."""
+    """Two poles, a beam across them and an X between them; conductors at one level."""
     frame = _Frame()
     half, beam = 0.1 * height, height - 0.8
     for side in (-1, 1):
@@ -211,8 +211,8 @@ KINDS: Mapping[str, Callable[[float, int, int], Structure]] = MappingProxyType(
 def sample(members: np.ndarray, density: float, rng: np.random.Generator) -> np.ndarray:
     """Points (N, 3) on the surface of ``members`` (M, 8), ``density`` per m^2 everywhere.
 
-    The side away from the scanner returns as well: a helicopter passes from several directions and
-    nothing is occluded (thesis 5.1.1).
+    All sides have points: the helicopter passes in several directions and nothing is occluded
+    (thesis 5.1.1).
     """
     start, end = members[:, :3], members[:, 3:6]
     axis = end - start
@@ -234,7 +234,7 @@ def sample(members: np.ndarray, density: float, rng: np.random.Generator) -> np.
 
 
 def place(points: np.ndarray, x: float, y: float, z: float, azimuth: float) -> np.ndarray:
-    """Points (N, 3) of a tower's frame put at (x, y, z) in a line that runs towards ``azimuth``.
+    """Points (N, 3) in the frame of a tower, moved to (x, y, z) on a line in direction ``azimuth``.
 
     The azimuth is in radians, counter-clockwise from east.
     """

@@ -1,4 +1,4 @@
-"""Whatever a decoder does, it does to itself."""
+"""A failing decoder does not affect the program that started it."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_a_decoder_that_stops_half_way_is_not_taken_for_the_end(laz):
 
 def test_a_decoder_that_sends_more_points_than_the_header_has_is_not_believed(laz):
     script = "import sys, struct; sys.stdout.buffer.write(struct.pack('<cI', b'P', 4000000000))"
-    with pytest.raises(InputError, match="not points"):
+    with pytest.raises(InputError, match="other than points"):
         decode(laz, script)
 
 

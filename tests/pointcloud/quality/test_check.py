@@ -1,4 +1,4 @@
-"""What the check tells of a survey can be counted by hand."""
+"""The results of a check agree with counts by hand."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_each_oddity_has_its_warning(grid_survey, patched):
     flagged = grid_survey(add=[[544e3, 4634e3, 101]], add_codes=[143])
     assert warned(flagged, "edp", "look like 15 with flags")
     box = patched(grid_survey("a.las"), {179: struct.pack("<d", 544_010.0)})
-    assert warned(box, "edp", "600 points outside of the bounding box")
+    assert warned(box, "edp", "600 points outside the bounding box")
 
 
 def test_degrees_are_told_and_give_no_density(tmp_path):
@@ -139,8 +139,8 @@ def test_merged_classes_of_a_ts40k_sample_taken_for_edp_are_warned_of(tmp_path):
     path = tmp_path / "sample.pt"
     codes = torch.tensor([1, 4, 5, 2])
     torch.save({"input_pcd": torch.rand(4, 3), "semantic_labels": codes}, path)
-    assert warned(path, "edp", "codes ts40k")
-    assert not warned(path, "ts40k", "codes ts40k")
+    assert warned(path, "edp", "use class scheme ts40k")
+    assert not warned(path, "ts40k", "use class scheme ts40k")
 
 
 @pytest.mark.parametrize("point_format", [1, 3, 6, 7])

@@ -1,11 +1,11 @@
-"""Towers and the wires between them."""
+"""Towers and the conductors between them."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from scenenet.synthetic.returns.conductors import catenary, string_wires
+from scenenet.synthetic.returns.conductors import catenary, string_conductors
 from scenenet.synthetic.scene.towers import KINDS, place, sample
 
 KINDS_AND_CIRCUITS = [(kind, circuits) for kind in KINDS for circuits in (1, 2)]
@@ -74,7 +74,7 @@ def test_wire_ends_where_it_is_held_and_hangs_below_the_chord(rise):
 def test_scan_lines_meet_wires_and_only_the_scanned_part():
     starts, ends = np.array([[0, -1, 10], [0, 1, 10.0]]), np.array([[100, -1, 10], [100, 1, 10.0]])
     rng = np.random.default_rng(0)
-    points = string_wires(starts, ends, 900.0, 0.2, 0.8, rng, (0.25, 0.75))
+    points = string_conductors(starts, ends, 900.0, 0.2, 0.8, rng, (0.25, 0.75))
     assert points[:, 0].min() >= 25
     assert points[:, 0].max() <= 75
     assert len(points) == pytest.approx(2 * 50 / 0.2 * 0.8, rel=0.1)

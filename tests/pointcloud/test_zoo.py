@@ -18,7 +18,7 @@ from scenenet.pointcloud.quality.check import check_survey
 
 TIME_LIMIT_S = 10
 REFUSED = {
-    "PDAL__1.2-no-points.las": "claims 1065 points, but the file holds only 0",
+    "PDAL__1.2-no-points.las": "claims 1065 points, but the file has room for only 0",
     "PDAL__garbage_nVariableLength.las": "claims 1069128089 variable length records",
     "PDAL__simple-laszip-compressor-version-1.2r0.laz": "no chunk table",
     "git_lfs_pointer.copc.laz": "git lfs pull",

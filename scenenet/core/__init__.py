@@ -6,6 +6,7 @@
 - ``progress``: progress of long work on stderr.
 - ``provenance``: fingerprints of inputs, the record of what made a result.
 - ``code_hash``: a digest of the code behind a result.
+- ``extras``: optional dependencies.
 - ``compilation``: how numba compiles the loops.
 - ``peak_memory``: memory that the process has used.
 """

@@ -1,7 +1,7 @@
-"""SCENE-Net, CNN and boosted trees, trained on the same crops and scored on the same others.
+"""Training and tuning of SCENE-Net, CNN and boosted trees on the same crops.
 
-Each chooses tau in its own way (docs/method/baselines.md): a SCENE-Net in metres on its training
-crops as well, the boosted trees never on those.
+The choice of tau differs (docs/method/baselines.md): a SCENE-Net in metres uses its training crops
+as well, the boosted trees never do.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from scenenet.models.settings import ModelSettings
 from scenenet.training.train import LostTraining, fit
 from scenenet.training.tuning import tuned_tau
 
-Answer = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
-"""Probability (V,) and truth (V,) of all voxels of a sample."""
+Predict = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
+"""Sample -> probabilities (V,) and labels (V,) bool of all voxels of its grid."""
 
 
 @dataclass(frozen=True)
 class TunedModel:
-    """A trained model with what it was tuned to.
+    """A trained model with its threshold.
 
     Attributes:
-        answer: what it says to a sample.
+        predict: probabilities and labels of a sample.
         tau: threshold.
-        f05: at tau, on the crops that tau was chosen on.
-        parameters: trained numbers.
-        seconds: that training and tuning took.
+        f05: F0.5 at tau on the crops that tau was chosen on.
+        parameters: number of trained parameters.
+        seconds: time of training and tuning.
     """
 
-    answer: Answer
+    predict: Predict
     tau: float
     f05: float
     parameters: int
@@ -52,16 +52,16 @@ class TunedModel:
         """Counts over all voxels of ``samples``."""
         total = Confusion()
         for sample in samples:
-            total += confusion(*self.answer(sample), self.tau)
+            total += confusion(*self.predict(sample), self.tau)
         return total
 
     def score_towers(
         self, samples: Iterable[VoxelSample], detection: DetectionSettings
     ) -> Confusion:
-        """The same of the voxels of whole towers that are found (docs/method/detection.md)."""
+        """Counts for the voxels of the whole towers that are found (docs/method/detection.md)."""
         total = Confusion()
         for sample in samples:
-            probability, truth = self.answer(sample)
+            probability, truth = self.predict(sample)
             found = detect_in_crop(sample, probability, self.tau, detection)
             total += confusion(sample.spread(found.voxels)[0], truth, 0.5)
         return total
@@ -70,7 +70,7 @@ class TunedModel:
         """Scores over all voxels of ``samples`` at every tau."""
         total = ThresholdCurve.empty()
         for sample in samples:
-            total += ThresholdCurve.of(*self.answer(sample))
+            total += ThresholdCurve.of(*self.predict(sample))
         return total
 
 
@@ -84,11 +84,13 @@ def train_and_tune(
 
     Args:
         settings: of the model; None for the boosted trees.
-        validation: crops to choose tau on; without any it is chosen on the training crops, and
-            for the boosted trees it is chosen by leaving out one of them at a time.
+        training: crops to train on.
+        validation: crops to choose tau on. If there are none, tau is chosen on the training crops,
+            for the boosted trees by leaving out one of them at a time.
+        seed: of the training.
 
     Raises:
-        InputError: there is no tower to learn from, or a single crop for boosted trees.
+        InputError: no training crop has a tower, or there is one crop for the boosted trees.
     """
     if settings is None:
         return train_boosted_trees(training, validation, seed)
@@ -101,7 +103,7 @@ def train_model(
     validation: Sequence[VoxelSample],
     seed: int,
 ) -> TunedModel:
-    """A SCENE-Net or a CNN; as ``train_and_tune``. One that loses its way finds nothing."""
+    """Train a SCENE-Net or a CNN as ``train_and_tune``; if it diverges, it detects nothing."""
     begin = time.perf_counter()
     try:
         model, _ = fit(training, [], settings, seed)
@@ -113,10 +115,10 @@ def train_model(
     tau, curve = tuned_tau(model, validation or training, others, settings.measurement)
     counts = curve.at(tau)
 
-    def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
+    def predict(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         return probabilities(model, sample, settings.measurement)
 
-    return TunedModel(answer, tau, counts.f05, model.n_parameters(), time.perf_counter() - begin)
+    return TunedModel(predict, tau, counts.f05, model.n_parameters(), time.perf_counter() - begin)
 
 
 def _nothing(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
@@ -126,7 +128,7 @@ def _nothing(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
 def train_boosted_trees(
     training: Sequence[VoxelSample], validation: Sequence[VoxelSample], seed: int = 0
 ) -> TunedModel:
-    """Trees; as ``train_and_tune``."""
+    """Train boosted trees as ``train_and_tune``."""
     begin = time.perf_counter()
     settings = BoostedTreesSettings()
     if validation:

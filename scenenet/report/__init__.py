@@ -1,4 +1,4 @@
-"""The page with every table and figure, ours beside the thesis."""
+"""The report: every table and figure, with the numbers of the thesis."""
 
 from scenenet.report.page import write_report
 

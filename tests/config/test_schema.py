@@ -109,24 +109,24 @@ def test_a_wrong_value_is_named_with_its_key(settings, expected):
     assert expected in complaint(**settings)
 
 
-def test_a_wrong_value_is_answered_with_the_default_and_the_unit():
+def test_the_message_about_a_wrong_value_has_the_default_and_the_unit():
     message = complaint(detection={"eps": "near"})
     assert "(m, " in message
     assert message.endswith("      detection:\n        eps: 6.0")
 
 
-def test_all_mistakes_are_told_at_once():
+def test_all_mistakes_are_reported_together():
     message = complaint(towers={"epps": 1}, crops={"radius": 2}, seeds="none")
     assert message.startswith("configuration: 3 settings are wrong\n")
     for key in ("towers.epps", "crops.radius", "seeds"):
         assert f"  {key}: " in message
 
 
-def test_a_mistake_in_the_common_training_settings_is_told_once():
+def test_a_mistake_in_the_common_training_settings_is_reported_once():
     assert complaint(training={"epoch": 3}).count("no such setting") == 1
 
 
-def test_a_mistake_in_one_model_is_told_of_that_model():
+def test_a_mistake_in_one_model_is_reported_for_that_model():
     models = [MODELS[0], {"name": "cnn", "kind": "cnn", "training": {"epoch": 3}}]
     message = complaint(models=models)
     assert "models[1].training.epoch: there is no such setting" in message

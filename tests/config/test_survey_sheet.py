@@ -97,7 +97,7 @@ def test_a_row_that_is_wrong_is_named_by_its_line(root, row, expected):
     assert expected in message
 
 
-def test_all_problems_are_told_at_once(root):
+def test_all_problems_are_reported_together(root):
     message = complaint(
         root,
         "north\tdata/north.laz\tedp\ttrain",
@@ -124,18 +124,18 @@ def test_a_file_cannot_be_trained_on_under_two_names(root):
     assert [survey.role for survey in read(root, *rows)] == ["train", "new"]
 
 
-def test_a_missing_column_is_told_with_what_may_be_meant(root):
+def test_a_missing_column_is_reported_with_a_suggestion(root):
     message = complaint(root, header="survey\tpath\tcode\trole")
     assert "column 'codes' is missing" in message
     assert "column 'code' is not known, did you mean 'codes'?" in message
 
 
-def test_commas_instead_of_tabs_are_told(root):
+def test_commas_instead_of_tabs_are_reported(root):
     message = complaint(root, header="survey,path,codes,role")
     assert "line 1: the columns of the survey sheet must be separated by tabs" in message
 
 
-def test_an_empty_sheet_is_told_what_belongs_into_it(root):
+def test_the_message_about_an_empty_sheet_names_the_columns(root):
     assert "survey, path, codes, role" in complaint(root, header="# nothing")
 
 

@@ -1,4 +1,4 @@
-"""Each rival is trained and tuned as it is elsewhere, and never on what it is scored on."""
+"""Each model is trained and tuned as it is elsewhere, and never on what it is scored on."""
 
 from __future__ import annotations
 
@@ -49,18 +49,18 @@ def crops():
 
 @pytest.mark.parametrize("settings", MODELS, ids=["operational", "thesis", "cnn"])
 def test_with_validation_crops_a_model_is_tuned_as_in_the_workflow(crops, settings):
-    rival = train_and_tune(settings, crops[:3], crops[3:4], 1)
+    tuned_model = train_and_tune(settings, crops[:3], crops[3:4], 1)
     model, _ = fit(crops[:3], [], settings, 1)
     card = ModelCard(
         name="m", codes="edp", measurement="presence", fit="cube", resolution=32, voxel_size=1.0
     )
-    _, card, told = choose(model, card, crops[3:4], TuningSettings(), crops[:3])
-    assert rival.tau == card.threshold()
-    assert rival.f05 == told["validation"]["f05"]
-    assert rival.parameters == model.n_parameters()
-    probability, truth = rival.answer(crops[4])
-    assert rival.score(crops[4:]) == confusion(probability, truth, rival.tau)
-    curve = rival.curve(crops[4:])
+    _, card, tuning = choose(model, card, crops[3:4], TuningSettings(), crops[:3])
+    assert tuned_model.tau == card.threshold()
+    assert tuned_model.f05 == tuning["validation"]["f05"]
+    assert tuned_model.parameters == model.n_parameters()
+    probability, truth = tuned_model.predict(crops[4])
+    assert tuned_model.score(crops[4:]) == confusion(probability, truth, tuned_model.tau)
+    curve = tuned_model.curve(crops[4:])
     np.testing.assert_array_equal(curve.true, ThresholdCurve.of(probability, truth).true)
 
 
@@ -69,11 +69,11 @@ def test_without_validation_tau_is_of_the_training_crops(crops):
     assert thesis.tau == thesis.curve(crops[:3]).best()[0]
 
 
-def test_the_boosted_trees_is_never_tuned_on_what_its_trees_know(crops):
+def test_boosted_trees_are_never_tuned_on_their_training_crops(crops):
     settings = BoostedTreesSettings()
     tuned, curve = boosted_trees.fit_and_tune(crops[:3], settings, 2)
-    rival = train_and_tune(None, crops[:3], [], 2)
-    assert (rival.tau, rival.f05) == (tuned.threshold(), curve.best()[1].f05)
+    tuned_model = train_and_tune(None, crops[:3], [], 2)
+    assert (tuned_model.tau, tuned_model.f05) == (tuned.threshold(), curve.best()[1].f05)
     with_validation = train_and_tune(None, crops[:3], crops[3:4], 2)
     assert with_validation.tau == with_validation.curve(crops[3:4]).best()[0]
     assert with_validation.f05 == with_validation.score(crops[3:4]).f05
@@ -81,12 +81,12 @@ def test_the_boosted_trees_is_never_tuned_on_what_its_trees_know(crops):
         train_and_tune(None, crops[:1], [], 0)
 
 
-def test_a_training_that_loses_its_way_finds_nothing(crops):
+def test_a_training_that_diverges_detects_nothing(crops):
     wild = TrainingSettings(epochs=3, learning_rate=1e30, optimiser="sgd")
     settings = ModelSettings(name="m", kind="cnn", kernel_size=(3, 3, 3), training=wild)
-    rival = train_and_tune(settings, crops[:3], [], 0)
-    assert rival.f05 == 0
-    counts = rival.score(crops)
+    tuned_model = train_and_tune(settings, crops[:3], [], 0)
+    assert tuned_model.f05 == 0
+    counts = tuned_model.score(crops)
     assert (counts.tp, counts.fp) == (0, 0)
     assert counts.fn == sum(int(sample.tower.sum()) for sample in crops)
-    assert rival.parameters == 3 * 27 + 3
+    assert tuned_model.parameters == 3 * 27 + 3

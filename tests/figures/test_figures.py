@@ -40,7 +40,7 @@ def test_the_plan_names_every_picture_before_anything_has_run(tmp_path: Path):
     ]  # fmt: skip
 
 
-def test_surveys_of_the_data_set_are_shown_beside_each_other(results: Results):
+def test_surveys_of_the_data_set_are_shown_in_one_figure(results: Results):
     names = {d.name: d.section for d in plan(results)}
     assert names["surveys"] == "data"
 
@@ -170,7 +170,7 @@ def test_an_even_kernel_reaches_further_up_than_down(tmp_path: Path, monkeypatch
     assert tuple(side.get_extent()) == (-1.5, 1.5, -1.5, 2.5)
 
 
-def test_the_start_of_a_number_and_the_thesis_stand_beside_it(tmp_path: Path):
+def test_parameters_are_drawn_with_initial_and_published_values(tmp_path: Path):
     alt = numbers.parameters(
         {"cylinder.r": [0.5, 0.7], "lambda.negative_sphere": [0.2, 0.4]},
         tmp_path / "p.png",

@@ -67,6 +67,6 @@ def test_a_start_that_looked_at_the_data_is_not_drawn_again():
     assert initial_model(result(cnn), new_model(cnn, 3)) is None
 
 
-def test_without_a_record_and_a_history_nothing_is_said():
+def test_without_a_record_and_a_history_the_initial_model_is_unknown():
     model = MetricSceneNet(metric=MetricSettings())
     assert initial_model(SeedResult("m", "scenenet", 3, {}), model) is None

@@ -27,7 +27,7 @@ def row(frame: pd.DataFrame, **where) -> pd.Series:
     return frame.iloc[0]
 
 
-def test_class_shares_are_those_of_all_points_with_table_5_1_beside(
+def test_class_shares_are_those_of_all_points_with_those_of_table_5_1(
     results: Results, thesis: Thesis
 ):
     found = tables.classes(results, thesis)
@@ -73,7 +73,7 @@ def test_models_have_mean_and_spread_over_seeds(results: Results, thesis: Thesis
     assert (found["thesis_precision"], found["thesis_precision_std"]) == (0.68, 0.08)
 
 
-def test_dead_seeds_count_and_the_live_ones_are_told_apart(results: Results, thesis: Thesis):
+def test_dead_seeds_count_and_live_ones_have_a_row_of_their_own(results: Results, thesis: Thesis):
     found = tables.models(results, thesis)
     every = row(found, model="cnn", counted="all seeds")
     live = row(found, model="cnn", counted="live seeds")
@@ -131,7 +131,7 @@ def test_inference_and_memory_are_as_measured(results: Results, thesis: Thesis):
     assert math.isnan(cnn["inference_ms_128"])
 
 
-def test_the_boosted_trees_is_timed_beside_the_models(results: Results, thesis: Thesis):
+def test_the_boosted_trees_are_timed(results: Results, thesis: Thesis):
     folder = results.folder / "boosted_trees"
     folder.mkdir()
     evaluation = (results.folder / "evaluate" / "scenenet" / "seed-0.json").read_text()
@@ -144,7 +144,7 @@ def test_the_boosted_trees_is_timed_beside_the_models(results: Results, thesis: 
     assert (found["inference_ms"], found["peak_memory_mb"]) == (30, 900)
 
 
-def test_numbers_are_in_metres_with_their_start_and_the_thesis_beside(
+def test_parameters_are_in_metres_with_initial_and_published_values(
     results: Results, thesis: Thesis, growth: float
 ):
     found = tables.parameters(results, thesis)
@@ -167,7 +167,7 @@ def test_numbers_are_in_metres_with_their_start_and_the_thesis_beside(
     assert weights["mean"].sum() == pytest.approx(1, abs=1e-5)
 
 
-def test_what_is_certain_of_each_model_stands_in_rows(results: Results, thesis: Thesis):
+def test_each_verified_property_of_each_model_has_a_row(results: Results, thesis: Thesis):
     found = tables.certificate(results, thesis)
     counts = found["model"].value_counts()
     assert (counts["scenenet"], counts["cnn"]) == (8, 2)
@@ -217,7 +217,7 @@ def test_a_misspelt_published_number_is_named(tmp_path: Path):
         read_thesis(file)
 
 
-def test_the_boosted_trees_stands_beside_the_models(results: Results, thesis: Thesis):
+def test_the_boosted_trees_have_a_row(results: Results, thesis: Thesis):
     source = results.folder / "evaluate" / "scenenet" / "seed-0.json"
     entry = json.loads(source.read_text()) | {"parameters": 1000}
     for seed, precision in ((0, 0.9), (1, 0.7)):
@@ -230,7 +230,7 @@ def test_the_boosted_trees_stands_beside_the_models(results: Results, thesis: Th
     assert (found["parameters"], found["n_seeds"]) == (1000, 2)
 
 
-def test_both_ways_to_count_stand_beside_each_other(results: Results, thesis: Thesis):
+def test_both_ways_to_count_are_in_one_row(results: Results, thesis: Thesis):
     for seed in results.seeds:
         path = results.folder / "evaluate" / "scenenet" / f"seed-{seed}.json"
         told = json.loads(path.read_text())

@@ -67,7 +67,7 @@ def test_time_that_is_saved_is_better_the_more_it_is(
     assert found["verdict"] == verdict
 
 
-def test_studies_stand_beside_the_tables_they_repeat(results: Results, thesis: Thesis):
+def test_studies_are_compared_with_the_tables_they_repeat(results: Results, thesis: Thesis):
     study = StudySettings(
         name="ablations", title="t", place="Table 5.5", asks="?", seeds=(0,),
         variants=({"name": "A", "thesis": "ablation.a"}, {"name": "E", "thesis": "ablation.e"}),
@@ -92,7 +92,7 @@ def test_a_range_counts_as_reproduced_inside_and_not_outside(results: Results, t
         assert row(compare(results, told), "towers.height")["verdict"] == verdict
 
 
-def test_what_studies_say_by_themselves_stands_beside_the_thesis(results: Results, thesis: Thesis):
+def test_findings_of_studies_are_compared_with_the_thesis(results: Results, thesis: Thesis):
     told = {
         "starts": StudySettings(
             name="starts", title="t", place="5.2.6", asks="?", seeds=(0, 1, 2, 3),
@@ -123,7 +123,7 @@ def test_what_studies_say_by_themselves_stands_beside_the_thesis(results: Result
     assert row(frame, "protocol.epochs_needed")["verdict"] == "not"
 
 
-def test_settings_of_the_thesis_stand_beside_those_of_its_protocol(
+def test_settings_of_the_thesis_are_compared_with_those_of_its_protocol(
     results: Results, thesis: Thesis
 ):
     settings = {

@@ -181,7 +181,7 @@ def test_more_measures_than_mlflow_takes_at_once_are_all_logged(settings, client
     assert len(run.data.params) == 230
 
 
-def test_model_and_figures_are_artifacts_beside_the_database(settings, client, results, tmp_path):
+def test_model_and_figures_are_artifacts_next_to_the_database(settings, client, results, tmp_path):
     planned = [d for d in plan(results) if d.name == "kernels-cnn"]
     log(settings, results, tmp_path, pictures=draw_all(planned, tmp_path / "figures"))
     (run,) = runs(client)["scenenet seed 0"]
@@ -217,7 +217,7 @@ def test_a_parent_has_the_summary_of_the_runs_under_it(settings, client, results
         assert child.data.tags["mlflow.parentRunId"] == parent.info.run_id
 
 
-def test_the_boosted_trees_stands_beside_the_models(settings, client, results, tmp_path):
+def test_the_boosted_trees_have_runs_like_the_models(settings, client, results, tmp_path):
     told = json.loads((results.folder / "evaluate" / "scenenet" / "seed-1.json").read_text())
     box = results.folder / "boosted_trees" / "seed-1.json"
     box.parent.mkdir()
@@ -258,7 +258,7 @@ def test_a_changed_result_replaces_its_run_and_its_parent_alone(
     assert found["cnn seed 1"][0].data.tags["mlflow.parentRunId"] == parent
 
 
-def test_a_seed_that_is_no_longer_asked_for_leaves_the_group(settings, client, results, tmp_path):
+def test_a_seed_that_is_no_longer_configured_leaves_the_group(settings, client, results, tmp_path):
     log(settings, results, tmp_path)
     log(settings, replace(results, seeds=[0]), tmp_path)
     assert sorted(runs(client)) == [
@@ -428,7 +428,7 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(
     assert {run["status"] for run in again["runs"].values()} == {"kept"}
 
 
-def test_the_best_seed_is_in_the_registry_and_answers_a_batch_of_any_size(
+def test_the_best_seed_is_in_the_registry_and_predicts_a_batch_of_any_size(
     settings, results, tmp_path
 ):
     groups = model_groups(results, "toys")

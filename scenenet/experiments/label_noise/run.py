@@ -130,7 +130,7 @@ def _rows(
         )
 
         def detect(sample: VoxelSample, tuned: TunedModel = tuned) -> np.ndarray:
-            return tuned.answer(sample)[0] >= tuned.tau
+            return tuned.predict(sample)[0] >= tuned.tau
 
         yield (
             facts

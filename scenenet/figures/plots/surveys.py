@@ -1,4 +1,4 @@
-"""Crops of several surveys beside each other, synthetic and recorded ones, at one scale."""
+"""Crops of several surveys, synthetic and recorded, at the same scale."""
 
 from __future__ import annotations
 

@@ -161,7 +161,7 @@ def test_contenders_are_models_of_the_configuration_with_changes(models):
         ([{"model": "cnn"}, {"model": "cnn"}], "cnn is listed more than once"),
     ],
 )
-def test_contenders_that_cannot_be_are_named(models: list[ModelSettings], told, named):
+def test_invalid_contenders_are_named(models: list[ModelSettings], told, named):
     with pytest.raises(ValueError, match=named):
         contenders([Contender(**one) for one in told], models, "label_noise")
 
@@ -175,6 +175,6 @@ def test_contenders_that_cannot_be_are_named(models: list[ModelSettings], told, 
         ({"levels": (1.0,)}, "less than 1"),
     ],
 )
-def test_settings_that_cannot_be_are_refused(fields, named):
+def test_invalid_settings_are_refused(fields, named):
     with pytest.raises(ValueError, match=named):
         LabelNoiseSettings(**fields)

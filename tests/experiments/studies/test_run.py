@@ -156,7 +156,7 @@ def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
     assert scores["f05"].nunique() > 1
 
 
-def test_models_of_other_kinds_are_trained_and_scored_beside(crops, tmp_path):
+def test_models_of_other_kinds_are_trained_and_scored_too(crops, tmp_path):
     told = study(
         seeds=(0,),
         variants=[
@@ -204,7 +204,7 @@ def test_a_training_that_loses_its_way_is_a_dead_one_and_the_others_go_on(crops,
     assert (lost_row["alive"], lost_row["f05"]) == (0, 0.0)
 
 
-def test_the_summary_is_over_seeds_with_the_thesis_beside():
+def test_the_summary_is_over_seeds_with_the_scores_of_the_thesis():
     told = study(variants=[{"name": "a", "thesis": "ablation.a"}, {"name": "b"}])
     runs = pd.DataFrame(
         [

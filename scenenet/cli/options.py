@@ -22,7 +22,10 @@ _RESOLUTIONS = get_args(voxels.VoxelSettings.model_fields["resolution"].annotati
 
 
 if TYPE_CHECKING:
-    Codes = Fits = Protocols = Kinds = StrEnum
+    Codes = StrEnum
+    Fits = StrEnum
+    Protocols = StrEnum
+    Kinds = StrEnum
 else:
 
     def _choices(name: str, values: Iterable[str]) -> type[StrEnum]:

@@ -44,7 +44,7 @@ class SurveyTower:
     )
     width: float = _column("m", "width of its body where nothing touches it", heading="width")
     conductor_directions: int = _column(
-        "", "number of directions in which conductors leave it", heading="directions of conductors",
+        "", "number of directions in which conductors leave it", heading="conductor directions",
         name="wire_directions",
     )  # fmt: skip
     conductor_bearings: tuple[float, ...] = _column(
@@ -56,8 +56,9 @@ class SurveyTower:
         "", "points of the survey in its voxels, detected or part of its body", heading="points"
     )
     edge_distance: float = _column(
-        "m", "distance to the edge of the data, at most 50 m", heading="distance to the data edge"
-    )
+        "m", "distance to the edge of the data, at most 50 m",
+        heading="distance from the edge of the data",
+    )  # fmt: skip
     contributions: Mapping[str, float] = _column(
         "1", "mean share of each GENEO in the observer over its detected voxels; positive shares "
         "support a tower, negative ones oppose it",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from scenenet.models.settings import ModelSettings, Protocol, TrainingSettings, TuningSettings
+from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
 
 EPOCHS = 150
 """Passes over the crops for training by gradient."""
 
-LEARNING_RATES: dict[Protocol, float] = {"thesis": 0.01, "operational": 0.001}
+LEARNING_RATES: dict[str, float] = {"thesis": 0.01, "operational": 0.001}
 """Step size of RMSProp. The CNN of the operational protocol starts near its optimum, from Fisher's
 discriminant; larger steps lead away from it."""
 
@@ -24,7 +24,7 @@ def is_searched(kind: str, protocol: str) -> bool:
 
 
 def preset(
-    kind: str, protocol: Protocol, epochs: int | None = None, learning_rate: float | None = None
+    kind: str, protocol: str, epochs: int | None = None, learning_rate: float | None = None
 ) -> ModelSettings:
     """The settings of a model of ``kind`` trained by ``protocol``.
 

@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from scenenet.core.files import digest
+from scenenet.detection.survey_tower import TOWER_COLUMNS
 from scenenet.report.blocks import (
     Block,
     Column,
@@ -23,6 +24,9 @@ from scenenet.report.blocks import (
     write,
 )
 from scenenet.report.context import ReportContext
+
+TOWER_FORMATS: dict[str, Format] = {"m": "metres", "1": "score", "": "count"}
+"""How the tower list writes the values of a column, by its unit."""
 
 TOWERS_LISTED = 300
 """Longest list of towers on the page; the GeoJSON file has all towers."""
@@ -89,16 +93,9 @@ def _tower_list(survey: str, geojson: Mapping[str, Any]) -> Block:
                     | {f"share.{name}": 100 * share for name, share in shares.items()})  # fmt: skip
     frame = pd.DataFrame(rows)
     known = [
-        Column("id", "tower", "count"),
-        Column("x", "x [m]", "metres"),
-        Column("y", "y [m]", "metres"),
-        Column("height", "height [m]", "metres"),
-        Column("base_elevation", "base elevation [m]", "metres"),
-        Column("width", "width [m]", "metres"),
-        Column("wire_directions", "conductor directions", "count"),
-        Column("probability", "probability", "score"),
-        Column("points", "points", "count"),
-        Column("edge_distance", "distance from the edge of the data [m]", "metres"),
+        Column(c.name, f"{c.heading} [m]" if c.unit == "m" else c.heading, TOWER_FORMATS[c.unit])
+        for c in TOWER_COLUMNS
+        if c.heading is not None
     ]
     shares = [
         Column(name, f"{name.removeprefix('share.').replace('_', ' ')} [%]", "share")

@@ -97,10 +97,10 @@ def _stretches(manifest: str | Path, settings: SplitSettings) -> pd.DataFrame:
     xy, radius = crops[["x", "y"]].to_numpy(float), crops["radius"].to_numpy(float)
     step = np.linalg.norm(np.diff(xy, axis=0), axis=1)
     overlap = np.append(False, step < radius[1:] + radius[:-1])[: len(crops)]
-    beside = np.append(False, step < settings.neighbour)[: len(crops)]
+    is_neighbour = np.append(False, step < settings.neighbour)[: len(crops)]
     numbers, number, length = [], -1, 0
     for i in range(len(crops)):
-        apart = not beside[i] or (length >= settings.stretch and not overlap[i])
+        apart = not is_neighbour[i] or (length >= settings.stretch and not overlap[i])
         if i == 0 or apart:
             number, length = number + 1, 0
         length += 1
@@ -113,7 +113,7 @@ def _stretches(manifest: str | Path, settings: SplitSettings) -> pd.DataFrame:
             "stretch": [f"{facts['survey']}-{number + 1:03d}" for number in joined],
             "x": crops["x"],
             "y": crops["y"],
-            "beside_previous": beside,
+            "next_to_previous": is_neighbour,
         }
     )
 
@@ -159,7 +159,7 @@ def _guards(table: pd.DataFrame) -> np.ndarray:
     """Positions of the crops to leave out: at each border the one whose part has more crops."""
     size = table["part"].value_counts()
     guards = []
-    for i in np.flatnonzero(table["beside_previous"]):
+    for i in np.flatnonzero(table["next_to_previous"]):
         before, after = table["part"].iloc[i - 1], table["part"].iloc[i]
         if before != after and (i - 1) not in guards:
             guards.append(i - 1 if size[before] >= size[after] else i)

@@ -73,7 +73,7 @@ def survey_info(path: str | Path) -> SurveyInfo:
             warnings=(),
         )  # fmt: skip
     header = read_header(path)
-    las, told = header.las, read_crs(header.las)
+    las, record = header.las, read_crs(header.las)
     return SurveyInfo(
         path=path,
         format=header.format,
@@ -82,10 +82,10 @@ def survey_info(path: str | Path) -> SurveyInfo:
         n_points=header.las.point_count,
         mins=_triple(las.mins),
         maxs=_triple(las.maxs),
-        crs=told.crs,
+        crs=record.crs,
         scales=_triple(las.scales),
         extra_dimensions=tuple(las.point_format.extra_dimension_names),
-        warnings=header.warnings if told.problem is None else (*header.warnings, told.problem),
+        warnings=header.warnings if record.problem is None else (*header.warnings, record.problem),
     )
 
 

@@ -1,8 +1,8 @@
 """Class codes of a synthetic survey: ``edp`` codes, as the public TS40K crops use them.
 
-The crops do not follow the class names of thesis Table 5.1 everywhere. "Rail" is bare ground there,
-"Road surface" whatever is low, "Overlap points" whatever is tall, and the ground that is "not
-rated" is bare ground too (docs: synthetic surveys).
+The crops do not follow the class names of thesis Table 5.1 everywhere. There "Rail" is bare
+ground, "Road surface" is low vegetation and other low objects, "Overlap points" is everything tall,
+and "Not rated object to be considered" is bare ground too (docs: synthetic surveys).
 """
 
 from __future__ import annotations

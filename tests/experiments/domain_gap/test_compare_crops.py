@@ -61,9 +61,9 @@ def test_the_table_says_what_is_in_range(measured):
 
 
 def test_a_folder_without_samples_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no TS40K samples"):
+    with pytest.raises(InputError, match="no TS40K sample"):
         next(real_crops(tmp_path))
-    with pytest.raises(InputError, match="no TS40K samples"):
+    with pytest.raises(InputError, match="no TS40K sample"):
         next(real_crops(tmp_path / "survey.laz"))
 
 

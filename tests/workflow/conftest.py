@@ -18,7 +18,7 @@ import yaml
 
 PARTS = ("Snakefile", "profiles", "workflow", "config")
 PACKAGE = "scenenet"
-RUN_LIMIT_S = 900
+RUN_LIMIT_S = 1800
 
 
 @dataclass(frozen=True)

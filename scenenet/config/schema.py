@@ -27,7 +27,12 @@ from scenenet.experiments.cross_validation.settings import CrossValidationSettin
 from scenenet.experiments.label_noise.settings import LabelNoiseSettings
 from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.experiments.studies.settings import StudySettings
-from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
+from scenenet.models.settings import (
+    ModelSettings,
+    TrainingSettings,
+    TuningSettings,
+    unused_settings,
+)
 from scenenet.pointcloud.class_schemes import Codes
 from scenenet.pointcloud.quality.check import CheckSettings
 from scenenet.prediction.settings import PredictSettings
@@ -137,7 +142,7 @@ class Config(Settings):
             return raw
         filled = [
             {**model, "training": merged(common, model.get("training") or {})}
-            if isinstance(model, Mapping)
+            if isinstance(model, Mapping) and "training" not in unused_settings(model)
             else model
             for model in models
         ]

@@ -19,6 +19,15 @@ class Settings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
+    @classmethod
+    def after_changes(cls, raw: dict[str, Any], changed: set[str]) -> dict[str, Any]:
+        """``raw`` without settings that lost their effect through a change of other ones.
+
+        Args:
+            changed: names of the settings that were changed, which stay.
+        """
+        return raw
+
 
 S = TypeVar("S", bound=Settings)
 
@@ -39,4 +48,5 @@ def changed(settings: S, changes: Mapping[str, Any]) -> S:
         for step in path:
             place = place.setdefault(step, {})
         place[last] = value
-    return type(settings).model_validate(raw)
+    named = {dotted.partition(".")[0] for dotted in changes}
+    return type(settings).model_validate(settings.after_changes(raw, named))

@@ -8,7 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from scenenet.core.settings import Settings
 from scenenet.dataset.voxels import Measurement
@@ -120,6 +125,19 @@ class TrainingSettings(Settings):
         return self.learning_rate * (1 - self.decay) ** ((epoch - 1) // self.decay_every)
 
 
+UNUSED: Mapping[str, tuple[str, ...]] = {
+    "cnn": ("metric", "search", "geneos"),
+    "thesis": ("metric", "search", "n_kernels"),
+    "operational": ("training", "kernel_size", "n_kernels"),
+}
+"""Settings that change nothing, for a CNN and for a SCENE-Net of each protocol."""
+
+
+def unused_settings(raw: Mapping[str, Any]) -> tuple[str, ...]:
+    """Settings without effect for the ``kind`` and ``protocol`` in ``raw``."""
+    return UNUSED.get("cnn" if raw.get("kind") == "cnn" else raw.get("protocol", "thesis"), ())
+
+
 class ModelSettings(Settings):
     """One architecture and the protocol it is trained by."""
 
@@ -152,7 +170,25 @@ class ModelSettings(Settings):
             )
         if "field" in raw:
             raise ValueError("the settings 'field' are now called 'metric'; write metric: instead")
+        if without_effect := [name for name in unused_settings(raw) if name in raw]:
+            what = (
+                "a cnn"
+                if raw.get("kind") == "cnn"
+                else (f"a SCENE-Net of protocol {raw.get('protocol', 'thesis')}")
+            )
+            raise ValueError(f"{', '.join(without_effect)}: without effect for {what}; remove it")
         return raw
+
+    @model_serializer(mode="wrap")
+    def _effective(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Only what has an effect, so that records of a model do not name anything else."""
+        raw = dump(self)
+        return {name: raw[name] for name in raw if name not in unused_settings(raw)}
+
+    @classmethod
+    def after_changes(cls, raw: dict[str, Any], changed: set[str]) -> dict[str, Any]:
+        unused = unused_settings(raw)
+        return {name: raw[name] for name in raw if name in changed or name not in unused}
 
     @model_validator(mode="after")
     def _start_fits(self) -> Self:

@@ -87,13 +87,19 @@ def card_of(
             "seed": seed,
             "data": digest(sorted(training.content)),
             "training_crops": len(training.samples),
-            "training": model.training.model_dump(),
             "protocol": model.protocol,
-            **({} if model.protocol == "thesis" else {"search": model.search.model_dump()}),
-            "trained_kernel_size": list(model.kernel_size),
+            **_how_trained(model),
             **provenance,
         },
     )
+
+
+def _how_trained(model: ModelSettings) -> dict[str, Any]:
+    settings = model.model_dump(mode="json")
+    found: dict[str, Any] = {k: settings[k] for k in ("training", "search") if k in settings}
+    if "kernel_size" in settings:
+        found["trained_kernel_size"] = settings["kernel_size"]
+    return found
 
 
 def fit(

@@ -155,6 +155,36 @@ def test_reading_a_configuration_loads_nothing_heavy():
 
 
 @pytest.mark.parametrize(
+    ("model", "names"),
+    [
+        ({"kind": "cnn", "geneos": ["arrow"]}, "geneos"),
+        ({"kind": "scenenet", "n_kernels": 3, "search": {}}, "search, n_kernels"),
+        (
+            {"kind": "scenenet", "protocol": "operational", "kernel_size": [9, 9, 9]},
+            "kernel_size",
+        ),
+        (
+            {"kind": "scenenet", "protocol": "operational", "training": {"epochs": 5}},
+            "training",
+        ),
+    ],
+)
+def test_a_setting_without_effect_is_refused(model, names):
+    assert f"{names}: without effect for" in complaint(models=[{"name": "m", **model}])
+
+
+def test_only_settings_with_an_effect_are_recorded():
+    searched = {"name": "m", "kind": "scenenet", "protocol": "operational"}
+    config = load(raw(models=[*MODELS, searched], training={"epochs": 7}))
+    recorded = {model["name"]: set(model) for model in config.plain()["models"]}
+    assert not recorded["m"] & {"training", "kernel_size", "n_kernels"}
+    assert not recorded["cnn"] & {"geneos", "metric", "search"}
+    assert not recorded["scenenet"] & {"n_kernels", "metric", "search"}
+    assert config.plain()["models"][0]["training"]["epochs"] == 7
+    assert load(config.plain()) == config
+
+
+@pytest.mark.parametrize(
     ("old", "key", "new"),
     [
         ({"protocol": "field"}, "models[0]", "write protocol: operational"),

@@ -77,7 +77,7 @@ def test_captions_describe_their_own_result(shown):
     assert "own" in shown["results/figures/prediction-own.png"]["caption"]
     assert "ablations" in shown["results/figures/study-ablations.png"]["caption"]
     assert "0, 1" in shown["results/tables/models.csv"]["caption"]
-    assert shown["results/figures/training-cnn.png"]["labels"] == {"figure": "Training cnn"}
+    assert shown["results/figures/training-cnn.png"]["labels"] == {"figure": "Training of cnn"}
     assert shown["results/tables/study-ablations.csv"]["labels"]["asks"] == (
         "Which operators does it need?"
     )
@@ -85,7 +85,8 @@ def test_captions_describe_their_own_result(shown):
 
 def test_another_caption_reruns_nothing(project):
     project.edit("workflow/report/figure-crop.rst", "A test crop", "One of the test crops")
-    project.edit("workflow/rules/captions.smk", '"Towers found"', '"Found towers"')
+    project.edit("workflow/rules/captions.smk", '"6 How it was made"', '"6 Provenance"')
+    project.edit("workflow/rules/report.smk", '"Report page"', '"Page"')
     assert project.planned() == {}
 
 

@@ -49,7 +49,7 @@ rule report:
             "page",
             "page",
             "Files",
-            {"file": "The page, whole"},
+            {"file": "Report page"},
         ),
         provenance=f"{R}/report/provenance.json",
     log:

@@ -40,6 +40,11 @@ class TrackingSettings(Settings):
     experiment: str = Field("scenenet", min_length=1, description="name of the MLflow experiment")
 
 
+def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
+    """The tracking settings with the MLflow experiment of a study or an experiment."""
+    return settings.model_copy(update={"experiment": f"{settings.experiment}-{study}"})
+
+
 def create_store(
     settings: TrackingSettings, record: str | Path, experiments: Sequence[str] = ()
 ) -> dict[str, Any]:

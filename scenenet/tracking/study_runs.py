@@ -13,7 +13,6 @@ from scenenet.experiments.studies.settings import StudySettings
 from scenenet.metrics.score_columns import DECISIVE_FIRST
 from scenenet.tracking.model_runs import data_of, origin_tags
 from scenenet.tracking.run_log import NOTE_TAG, RunGroup, RunRecord
-from scenenet.tracking.store import TrackingSettings
 
 if TYPE_CHECKING:
     from scenenet.figures import Picture
@@ -25,11 +24,6 @@ FACTS = (
 
 GIVEN = ("training_crops", "parameters", "epochs")
 """Facts that the variant determines; they have no spread over seeds."""
-
-
-def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
-    """The tracking settings with the MLflow experiment of a study or an experiment."""
-    return settings.model_copy(update={"experiment": f"{settings.experiment}-{study}"})
 
 
 def note_of(study: StudySettings) -> str:

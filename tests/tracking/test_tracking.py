@@ -30,13 +30,14 @@ from scenenet.tracking import (
     RunRecord,
     TrackingSettings,
     create_store,
+    experiment_of,
     log_runs,
     model_groups,
     store_id,
 )
 from scenenet.tracking.logged_model import example
 from scenenet.tracking.registry import register_champions
-from scenenet.tracking.study_runs import experiment_of, note_of, study_groups
+from scenenet.tracking.study_runs import note_of, study_groups
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,8 @@ def track_studies(job: _job.Job) -> None:
     from scenenet.experiments.studies.settings import StudySettings
     from scenenet.figures import read_pictures
     from scenenet.results.folder import read_result, read_table
-    from scenenet.tracking import TrackingSettings, log_runs
-    from scenenet.tracking.study_runs import experiment_of, note_of, study_groups
+    from scenenet.tracking import TrackingSettings, experiment_of, log_runs
+    from scenenet.tracking.study_runs import note_of, study_groups
 
     settings = TrackingSettings(**job.settings)
     studies = [StudySettings(**study) for study in job.identity["studies"]]

@@ -6,7 +6,7 @@ drawn.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -80,63 +80,94 @@ def plan(
         sources: survey -> file and codes of its labelled points, for the map of its towers. Folders
             of single crops have no map and are skipped.
     """
-    planned: list[Drawing] = []
-    for survey, (path, codes) in (sources or {}).items():
-        if Path(path).suffix.lower() in (".las", ".laz"):
-            draw = _bind(dataset_figures.draw_clusters, results, survey, path, codes)
-            labels = _bind(dataset_figures.draw_labels, survey, path, codes)
-            title = f"{survey}, coloured by its labels"
-            planned.append(Drawing(f"labels-{survey}", title, "data", labels, survey=survey))
-            title = f"Clusters of tower points in {survey}"
-            planned.append(Drawing(f"clusters-{survey}", title, "towers", draw, survey=survey))
+    return [
+        *_survey_maps(results, sources or {}),
+        *_of_dataset(results),
+        *_precision_recall(results, thesis),
+        *(drawing for model in results.models for drawing in _of_model(results, model, thesis)),
+        *_of_crops(results),
+        *_of_predictions(results),
+        *_of_studies(results, thesis),
+        *_of_experiments(results),
+    ]
+
+
+def _survey_maps(results: Results, sources: Mapping[str, Source]) -> Iterator[Drawing]:
+    """Maps of whole labelled surveys: their labels, and their towers."""
+    for survey, (path, codes) in sources.items():
+        if Path(path).suffix.lower() not in (".las", ".laz"):
+            continue
+        draw = _bind(dataset_figures.draw_labels, survey, path, codes)
+        title = f"{survey}, coloured by its labels"
+        yield Drawing(f"labels-{survey}", title, "data", draw, survey=survey)
+        draw = _bind(dataset_figures.draw_clusters, results, survey, path, codes)
+        title = f"Clusters of tower points in {survey}"
+        yield Drawing(f"clusters-{survey}", title, "towers", draw, survey=survey)
+
+
+def _of_dataset(results: Results) -> Iterator[Drawing]:
     if results.surveys:
         draw = _bind(dataset_figures.draw_surveys, results)
-        planned.append(Drawing("surveys", "Crops of each survey at the same scale", "data", draw))
-    models = tuple(results.models)
-    reference = results.predicting
-    if reference is not None:
-        draw = _bind(dataset_figures.draw_grids, results, reference)
-        planned.append(Drawing("voxels", "One crop on three grids", "voxels", draw))
+        yield Drawing("surveys", "Crops of each survey at the same scale", "data", draw)
+    if results.predicting is not None:
+        draw = _bind(dataset_figures.draw_grids, results, results.predicting)
+        yield Drawing("voxels", "One crop on three grids", "voxels", draw)
+
+
+def _precision_recall(results: Results, thesis: Thesis | None) -> Iterator[Drawing]:
+    if results.models:
         draw = _bind(model_figures.draw_curves, results, thesis)
-        title = "Precision and recall"
-        planned.append(Drawing("precision-recall", title, "models", draw, models))
-    for model, kind in results.models.items():
-        shown = (model,)
-        draw = _bind(model_figures.draw_training, results, model)
-        planned.append(
-            Drawing(f"training-{model}", f"Training of {model}", "training", draw, shown)
-        )
-        draw = _bind(model_figures.draw_kernels, results, model)
-        title = f"Kernels of {model}"
-        planned.append(Drawing(f"kernels-{model}", title, "learned", draw, shown))
-        if kind == "scenenet":
-            draw = _bind(model_figures.draw_parameters, results, model, thesis)
-            title = f"Learned parameters of {model}"
-            planned.append(Drawing(f"parameters-{model}", title, "learned", draw, shown))
-            draw = _bind(model_figures.draw_paths, results, model)
-            title = f"Parameters of {model} during training"
-            planned.append(Drawing(f"paths-{model}", title, "training", draw, shown))
-    if reference is not None:
-        for rank in CROP_RANKS:
-            draw = _bind(crop_figures.draw_crop, results, reference, rank)
-            title = f"The {rank} test crop"
-            planned.append(Drawing(f"crop-{rank}", title, "crops", draw, models))
-        draw = _bind(crop_figures.draw_resolutions, results, reference)
-        title = "One model on two grids"
-        planned.append(Drawing("resolutions", title, "crops", draw, (reference,)))
+        models = tuple(results.models)
+        yield Drawing("precision-recall", "Precision and recall", "models", draw, models)
+
+
+def _of_model(results: Results, model: str, thesis: Thesis | None) -> Iterator[Drawing]:
+    """Training and kernels of a model; for a SCENE-Net its parameters as well."""
+    shown = (model,)
+    draw = _bind(model_figures.draw_training, results, model)
+    yield Drawing(f"training-{model}", f"Training of {model}", "training", draw, shown)
+    draw = _bind(model_figures.draw_kernels, results, model)
+    yield Drawing(f"kernels-{model}", f"Kernels of {model}", "learned", draw, shown)
+    if results.models[model] != "scenenet":
+        return
+    draw = _bind(model_figures.draw_parameters, results, model, thesis)
+    title = f"Learned parameters of {model}"
+    yield Drawing(f"parameters-{model}", title, "learned", draw, shown)
+    draw = _bind(model_figures.draw_paths, results, model)
+    title = f"Parameters of {model} during training"
+    yield Drawing(f"paths-{model}", title, "training", draw, shown)
+
+
+def _of_crops(results: Results) -> Iterator[Drawing]:
+    """Test crops, chosen by the scores of the model that classifies surveys."""
+    reference = results.predicting
+    if reference is None:
+        return
+    for rank in CROP_RANKS:
+        draw = _bind(crop_figures.draw_crop, results, reference, rank)
+        models = tuple(results.models)
+        yield Drawing(f"crop-{rank}", f"The {rank} test crop", "crops", draw, models)
+    draw = _bind(crop_figures.draw_resolutions, results, reference)
+    yield Drawing("resolutions", "One model on two grids", "crops", draw, (reference,))
+
+
+def _of_predictions(results: Results) -> Iterator[Drawing]:
     for survey in results.predicted:
         draw = _bind(crop_figures.draw_prediction, results, survey)
-        name = f"prediction-{survey}"
-        planned.append(
-            Drawing(name, f"Classification of {survey}", "predictions", draw, survey=survey)
-        )
+        title = f"Classification of {survey}"
+        yield Drawing(f"prediction-{survey}", title, "predictions", draw, survey=survey)
+
+
+def _of_studies(results: Results, thesis: Thesis | None) -> Iterator[Drawing]:
     for study in results.studies:
         draw = _bind(model_figures.draw_study, results, study, thesis)
-        planned.append(Drawing(f"study-{study.name}", study.title, "studies", draw))
+        yield Drawing(f"study-{study.name}", study.title, "studies", draw)
+
+
+def _of_experiments(results: Results) -> Iterator[Drawing]:
     for name in results.experiments:
         draw = _bind(_draw_experiment, results, name)
-        planned.append(Drawing(name, EXPERIMENTS[name].title, name, draw))
-    return planned
+        yield Drawing(name, EXPERIMENTS[name].title, name, draw)
 
 
 def draw_all(planned: Iterable[Drawing], out: str | Path) -> list[Picture]:

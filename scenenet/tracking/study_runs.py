@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from scenenet.experiments.studies.settings import StudySettings
+from scenenet.experiments.studies.settings import StudySettings, Variant
 from scenenet.metrics.score_columns import DECISIVE_FIRST
 from scenenet.tracking.model_runs import data_of, origin_tags
-from scenenet.tracking.run_log import NOTE_TAG, RunGroup, RunRecord
+from scenenet.tracking.run_log import NOTE_TAG, DatasetRecord, RunGroup, RunRecord
 
 if TYPE_CHECKING:
     from scenenet.figures import Picture
@@ -62,48 +62,62 @@ def study_groups(
         rows = runs[runs["variant"] == variant.name].to_dict("records")
         if not rows:
             continue
+        own = tags | {"kind": str(rows[0]["kind"]), "variant": variant.name}
         key = f"study-{study.name}/{dataset}/{variant.name}"
-        params = {
-            "variant": variant.name,
-            **{
-                name: json.dumps(value) if isinstance(value, list | tuple) else value
-                for name, value in (study.common | variant.changes).items()
-            },
-        }
-        children = [
-            RunRecord(
-                key=f"{key}/seed-{row['seed']}",
-                name=f"{variant.name}, seed {row['seed']}",
-                params=params | {"seed": row["seed"]},
-                metrics=_metrics(row, study.part),
-                tags=tags
-                | {
-                    "kind": str(row["kind"]),
-                    "variant": variant.name,
-                    "seed": str(row["seed"]),
-                    "alive": str(bool(row["alive"])).lower(),
-                },
-                datasets=datasets,
-                seconds=float(row["training_seconds"]),
-            )
-            for row in rows
-        ]
+        params = _params(study, variant)
+        children = [_seed_record(row, key, params, own, datasets, study.part) for row in rows]
+        note = f"{study.asks} Mean over {len(rows)} seeds; thesis {study.place}."
         parent = RunRecord(
             key=key,
             name=variant.name,
             params=params,
             metrics=_means([child.metrics for child in children]),
-            tags=tags
-            | {
-                "kind": str(rows[0]["kind"]),
-                "variant": variant.name,
-                NOTE_TAG: f"{study.asks} Mean over {len(rows)} seeds; thesis {study.place}.",
-            },
+            tags=own | {NOTE_TAG: note},
             artifacts={f"figures/{picture.file.name}": picture.file for picture in pictures},
             seconds=sum(child.seconds for child in children),
         )
         groups.append(RunGroup(parent, children))
     return groups
+
+
+def _params(study: StudySettings, variant: Variant) -> dict[str, Any]:
+    """The settings of a variant; lists as JSON, because MLflow keeps plain text."""
+    changes = study.common | variant.changes
+    plain = {
+        name: json.dumps(value) if isinstance(value, list | tuple) else value
+        for name, value in changes.items()
+    }
+    return {"variant": variant.name, **plain}
+
+
+def _seed_record(
+    row: Mapping[str, Any],
+    group: str,
+    params: Mapping[str, Any],
+    tags: Mapping[str, str],
+    datasets: Sequence[DatasetRecord],
+    part: str,
+) -> RunRecord:
+    """The run of one seed of a variant.
+
+    Args:
+        row: of the table of runs.
+        group: key of the variant.
+        params, tags: of the variant.
+        datasets: data of the study.
+        part: part of the split that was scored.
+    """
+    seed = row["seed"]
+    own = {"kind": str(row["kind"]), "seed": str(seed), "alive": str(bool(row["alive"])).lower()}
+    return RunRecord(
+        key=f"{group}/seed-{seed}",
+        name=f"{row['variant']}, seed {seed}",
+        params={**params, "seed": seed},
+        metrics=_metrics(row, part),
+        tags={**tags, **own},
+        datasets=datasets,
+        seconds=float(row["training_seconds"]),
+    )
 
 
 def _metrics(row: Mapping[str, Any], part: str) -> dict[str, float | None]:

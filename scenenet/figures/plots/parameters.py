@@ -15,6 +15,7 @@ from scenenet.figures.plots.style import COLOURS, new_figure, readable, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.image import AxesImage
 
 KERNEL_WIDTH = 2.6
 """Width of a column of slices, inches."""
@@ -51,35 +52,16 @@ def kernels(
         height=(KERNEL_WIDTH - 0.7) * sum(heights) + 0.5 * len(views) + 0.9,
         height_ratios=heights,
     )
-    unit = "voxel" if metres is None else "m"
     for column, name in enumerate(weights):
-        # Each kernel has its own scale, or a kernel of small weights would not be visible.
-        limit = max(float(np.abs(stage[name]).max()) for stage in stages.values()) or 1.0
-        images = []
-        for row, (stage, view) in enumerate(views):
-            axis = axes[row, column]
-            kernel = stages[stage][name]
-            kz, ky, _ = kernel.shape
-            shown = kernel[:, (ky - 1) // 2, :] if view == "side" else kernel[(kz - 1) // 2]
-            image = axis.imshow(
-                shown,
-                cmap="RdBu_r",
-                vmin=-limit,
-                vmax=limit,
-                origin="lower",
-                extent=_extent(shown.shape, metres or 1.0),
-            )
-            images.append(image)
-            axis.grid(False)
-            axis.set_xlabel(f"x [{unit}]")
-            axis.set_ylabel(f"{'z' if view == 'side' else 'y'} [{unit}]")
-            if column == 0:
-                axis.annotate(f"{stage}, {'from the side' if view == 'side' else 'from above'}",
-                              (-0.42, 0.5), xycoords="axes fraction", rotation=90, va="center",
-                              ha="center", fontsize=9, fontweight="bold")  # fmt: skip
+        shown = [(stages[stage][name], view) for stage, view in views]
+        image = _kernel_column(axes[:, column], shown, metres)
         axes[0, column].set_title(readable(name))
-        figure.colorbar(images[0], ax=axes[:, column], location="bottom", shrink=0.85, pad=0.02,
+        figure.colorbar(image, ax=axes[:, column], location="bottom", shrink=0.85, pad=0.02,
                         label="weight")  # fmt: skip
+    for axis, (stage, view) in zip(axes[:, 0], views, strict=True):
+        axis.annotate(f"{stage}, {'from the side' if view == 'side' else 'from above'}",
+                      (-0.42, 0.5), xycoords="axes fraction", rotation=90, va="center",
+                      ha="center", fontsize=9, fontweight="bold")  # fmt: skip
     save(figure, out)
     extent = "; ".join(
         f"{name} {stage} from {kernels[name].min():.3g} to {kernels[name].max():.3g}"
@@ -87,6 +69,39 @@ def kernels(
         for stage, kernels in stages.items()
     )
     return f"Middle slices of the kernels, side view above and top view below. Weights: {extent}."
+
+
+def _kernel_column(
+    axes: np.ndarray, shown: Sequence[tuple[np.ndarray, str]], metres: float | None
+) -> AxesImage:
+    """Draw the slices of one kernel below each other.
+
+    Args:
+        axes: one per slice.
+        shown: kernel (kz, ky, kx) and view (``side`` or ``top``) of each slice.
+        metres: as in ``kernels``.
+
+    Returns:
+        one of the images, for the scale that all of them share.
+    """
+    # Each kernel has its own scale, or a kernel of small weights would not be visible.
+    limit = max(float(np.abs(kernel).max()) for kernel, _ in shown) or 1.0
+    unit = "voxel" if metres is None else "m"
+    for axis, (kernel, view) in zip(axes, shown, strict=True):
+        kz, ky, _ = kernel.shape
+        middle = kernel[:, (ky - 1) // 2, :] if view == "side" else kernel[(kz - 1) // 2]
+        image = axis.imshow(
+            middle,
+            cmap="RdBu_r",
+            vmin=-limit,
+            vmax=limit,
+            origin="lower",
+            extent=_extent(middle.shape, metres or 1.0),
+        )
+        axis.grid(False)
+        axis.set_xlabel(f"x [{unit}]")
+        axis.set_ylabel(f"{'z' if view == 'side' else 'y'} [{unit}]")
+    return image
 
 
 def parameters(

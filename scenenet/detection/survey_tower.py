@@ -135,6 +135,8 @@ def read_towers(path: str | Path) -> list[SurveyTower]:
     """
     try:
         return [SurveyTower.from_feature(feature) for feature in read_json(path)["features"]]
+    except OSError as error:
+        raise InputError(error.strerror or "cannot be read", file=path) from None
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"not a tower list of this version ({type(error).__name__}: {error})",

@@ -5,10 +5,9 @@ Every function that draws writes one PNG and returns (alternative text, caption)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from scenenet.figures.selection import (
 from scenenet.results.folder import Results, SeedResult
 
 if TYPE_CHECKING:
+    from scenenet.evaluation.result import SampleScores
     from scenenet.figures.plots.point_clouds import View
     from scenenet.pointcloud import PointCloud
 
@@ -35,25 +35,25 @@ def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[s
 
     chosen_by = champion_of(results, reference)
     sample = ranked(chosen_by, rank)
-    cloud = crop_cloud(results, sample)
+    cloud = crop_cloud(results, sample.id)
     views = [View("labels", cloud.roles, "class")]
     views += [_probability(cloud, champion_of(results, model)) for model in results.models]
     keep = thinned(len(cloud))
     shown = [replace(view, values=view.values[keep]) for view in views]
     return side_views(cloud.xyz[keep], shown, out), (
-        f"Crop {sample['id']}: the {rank} of {len(chosen_by.evaluation['per_sample'])} test crops "
-        f"by F0.5 of {reference} (F0.5 {sample['f05']:.2f}, precision {sample['precision']:.2f}, "
-        f"recall {sample['recall']:.2f}{_counted(chosen_by, sample)}). Points have the probability "
+        f"Crop {sample.id}: the {rank} of {len(chosen_by.evaluation.per_sample)} test crops "
+        f"by F0.5 of {reference} (F0.5 {sample.f05:.2f}, precision {sample.precision:.2f}, "
+        f"recall {sample.recall:.2f}{_counted(chosen_by, sample)}). Points have the probability "
         "of their voxel; each model is its best seed on validation. Compare thesis Figures 5.8 and "
         "5.9."
     )
 
 
-def _counted(result: SeedResult, sample: Mapping[str, Any]) -> str:
+def _counted(result: SeedResult, sample: SampleScores) -> str:
     """Which voxels the scores of a sample count, unless those at or above tau."""
-    if not result.evaluation["whole_towers"]:
+    if not result.evaluation.whole_towers:
         return ""
-    return f"; whole towers. F0.5 of the voxels at or above tau: {sample['f05_observer']:.2f}"
+    return f"; whole towers. F0.5 of the voxels at or above tau: {sample.f05_observer:.2f}"
 
 
 def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]:
@@ -62,11 +62,7 @@ def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]
     found = results.prediction(survey)
     if found is None:
         raise InputError("the survey was not classified", file=results.folder / "predict" / survey)
-    _, geojson = found
-    towers = [
-        (*feature["geometry"]["coordinates"][:2], feature["properties"]["base_elevation"])
-        for feature in geojson["features"]
-    ]
+    towers = [(tower.x, tower.y, tower.base) for tower in found.towers]
     xyz, probability = _classified_points(results.folder / "predict" / survey / f"{survey}.laz")
     alt = survey_overview(xyz, probability, np.asarray(towers, float).reshape(-1, 3), out)
     return alt, (
@@ -86,11 +82,11 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
 
     champion = champion_of(results, model)
     sample = ranked(champion, "median")
-    cloud = crop_cloud(results, sample)
+    cloud = crop_cloud(results, sample.id)
     trained, card = read_model(champion.model_files[0])
     views, scores = [], []
     for resolution in FINER:
-        voxels = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution), sample["id"])
+        voxels = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution), sample.id)
         probability, truth = probabilities(trained, voxels, card.measurement)
         counts = confusion(probability, truth, card.threshold())
         size = voxels.grid.voxel_size
@@ -105,7 +101,7 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         "voxel": "in voxels, with the same number of voxels on both grids",
     }[trained.units]
     return labels_and_predictions(views, card.threshold(), out), (
-        f"Crop {sample['id']}, the median test crop by F0.5 of {model}, on two grids. From the "
+        f"Crop {sample.id}, the median test crop by F0.5 of {model}, on two grids. From the "
         f"left: voxels labelled tower; probability of {model} (seed {champion.seed}); voxels at "
         f"or above tau (green: true positive, orange: false positive, pink: false negative). The "
         f"model was trained on voxels of {card.voxel_size:.2f} m only; its kernels are "

@@ -106,7 +106,7 @@ def draw_grids(results: Results, reference: str, out: Path) -> tuple[str, str]:
     from scenenet.figures.plots.point_clouds import voxel_grids
 
     sample = ranked(champion_of(results, reference), "best")
-    cloud = crop_cloud(results, sample)
+    cloud = crop_cloud(results, sample.id)
     groups = cloud.roles
     grids = {}
     for resolution in GRID_RESOLUTIONS:
@@ -115,7 +115,7 @@ def draw_grids(results: Results, reference: str, out: Path) -> tuple[str, str]:
         names = voxel_classes(groups, voxels.grid.voxel_of(cloud.xyz), voxels.index)
         grids[f"{resolution}³, voxels of {voxels.grid.voxel_size:.2f} m"] = (zyx, names)
     return voxel_grids(grids, out), (
-        f"Occupied voxels of crop {sample['id']} at three resolutions, coloured by their "
+        f"Occupied voxels of crop {sample.id} at three resolutions, coloured by their "
         "content: a voxel is drawn as tower if it contains any tower point, else as conductor, "
         "vegetation, ground or other. Compare thesis Figure 5.4."
     )

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from scenenet.dataset.voxels import Measurement, VoxelSample
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.base import VoxelModel
+    from scenenet.pointcloud import PointCloud
 
 CLASSES = tuple(reversed(tuple(ROLE_COLOURS)))
 """Class of a voxel: the last of these that any of its points has."""
@@ -52,53 +53,87 @@ def write_scene(
     """
     from scenenet.dataset.voxels import VoxelSettings, voxelise
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.evaluation.crop_towers import detect_in_crop
-    from scenenet.figures.selection import (
-        champion_of,
-        crop_cloud,
-        ranked,
-        voxel_classes,
-    )
-    from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
-    from scenenet.metrics.voxel_scores import confusion
+    from scenenet.figures.selection import champion_of, crop_cloud, ranked
     from scenenet.models.model_file import read_model
     from scenenet.models.predictions import probabilities
 
     champion = champion_of(results, model)
     sample = ranked(champion, rank)
-    cloud = crop_cloud(results, sample)
+    cloud = crop_cloud(results, sample.id)
     trained, card = read_model(champion.model_files[0])
     settings = VoxelSettings(fit=card.fit, resolution=card.resolution, voxel_size=card.voxel_size)
-    voxels = voxelise(cloud, settings.grid(cloud.xyz), sample["id"])
-    everywhere, truth = probabilities(trained, voxels, card.measurement)
-    curve = ThresholdCurve.of(everywhere, truth)
-    probability, tau = everywhere[voxels.index], card.threshold()
-    whole = detect_in_crop(voxels, everywhere, tau, detection or DetectionSettings()).voxels
-    counts = confusion(voxels.spread(whole)[0], truth, 0.5).scores()
-    taus = THRESHOLDS.astype(probability.dtype)
-    zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
-    names = voxel_classes(cloud.roles, voxels.grid.voxel_of(cloud.xyz), voxels.index)
+    voxels = voxelise(cloud, settings.grid(cloud.xyz), sample.id)
+    probability, truth = probabilities(trained, voxels, card.measurement)
+    tau = card.threshold()
     scene = {
-        "crop": sample["id"],
+        "crop": sample.id,
         "rank": rank,
         "model": model,
         "seed": champion.seed,
         "voxel_size": voxels.grid.voxel_size,
+        **_voxels(voxels, cloud),
+        "shares": _shares(trained, voxels, card.measurement),
+        **_thresholds(voxels, probability, truth, tau),
+        **_whole_towers(voxels, probability, truth, tau, detection or DetectionSettings()),
+    }
+    write_json(out, scene)
+    return scene
+
+
+def _voxels(voxels: VoxelSample, cloud: PointCloud) -> dict[str, Any]:
+    """Place, class and label of each occupied voxel."""
+    from scenenet.figures.selection import voxel_classes
+
+    zyx = np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1)
+    names = voxel_classes(cloud.roles, voxels.grid.voxel_of(cloud.xyz), voxels.index)
+    return {
         "classes": CLASSES,
         "zyx": _coded(zyx.astype("<i2")),
         "class": _coded(np.array([CLASSES.index(name) for name in names], np.uint8)),
-        "steps": _coded(np.searchsorted(taus, probability, side="right").astype("<u2")),
         "tower": _coded(voxels.tower.astype("<u1")),
-        "shares": _shares(trained, voxels, card.measurement),
-        "whole": _coded(whole.astype("<u1")),
-        "whole_scores": {name: counts[name] for name in ("precision", "recall", "f05")},
+    }
+
+
+def _thresholds(
+    voxels: VoxelSample, probability: np.ndarray, truth: np.ndarray, tau: float
+) -> dict[str, Any]:
+    """How many thresholds each occupied voxel reaches, and the counts at every threshold.
+
+    Args:
+        probability, truth: (V,) of all voxels of the grid.
+        tau: the threshold that the view starts with.
+    """
+    from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
+
+    curve = ThresholdCurve.of(probability, truth)
+    taus = THRESHOLDS.astype(probability.dtype)
+    steps = np.searchsorted(taus, probability[voxels.index], side="right")
+    return {
+        "steps": _coded(steps.astype("<u2")),
         "taus": [float(f"{tau:.6g}") for tau in THRESHOLDS],
         "true": curve.true.tolist(),
         "false": curve.false.tolist(),
         "tau_step": int(np.argmin(np.abs(THRESHOLDS - tau))),
     }
-    write_json(out, scene)
-    return scene
+
+
+def _whole_towers(
+    voxels: VoxelSample,
+    probability: np.ndarray,
+    truth: np.ndarray,
+    tau: float,
+    detection: DetectionSettings,
+) -> dict[str, Any]:
+    """The voxels of whole towers found at tau, and their scores; arguments as ``_thresholds``."""
+    from scenenet.evaluation.crop_towers import detect_in_crop
+    from scenenet.metrics.voxel_scores import confusion
+
+    whole = detect_in_crop(voxels, probability, tau, detection).voxels
+    counts = confusion(voxels.spread(whole)[0], truth, 0.5).scores()
+    return {
+        "whole": _coded(whole.astype("<u1")),
+        "whole_scores": {name: counts[name] for name in ("precision", "recall", "f05")},
+    }
 
 
 def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) -> dict[str, str]:

@@ -24,9 +24,9 @@ def draw_curves(results: Results, thesis: Thesis | None, out: Path) -> tuple[str
     from scenenet.figures.plots.curves import precision_recall
 
     curves = {
-        model: [r.evaluation["pr_curve"] for r in results.of_model(model)]
+        model: [r.evaluation.pr_curve for r in results.of_model(model)]
         for model in results.models
-        if any(r.evaluation["pr_curve"] for r in results.of_model(model))
+        if any(r.evaluation.pr_curve for r in results.of_model(model))
     }
     published = {}
     for model, kind in results.models.items():

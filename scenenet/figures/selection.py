@@ -5,8 +5,7 @@ Crops are selected by rule (best, median, worst), never by hand.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from scenenet.pointcloud.class_schemes import ROLE_COLOURS
 from scenenet.results.folder import Results, SeedResult, read_table
 
 if TYPE_CHECKING:
+    from scenenet.evaluation.result import SampleScores
     from scenenet.pointcloud import PointCloud
 
 CLASSES = tuple(ROLE_COLOURS)
@@ -36,23 +36,23 @@ def champion_of(results: Results, model: str) -> SeedResult:
     return champion
 
 
-def ranked(champion: SeedResult, rank: str) -> Mapping[str, Any]:
+def ranked(champion: SeedResult, rank: str) -> SampleScores:
     """The best, median or worst test crop by F0.5; ties by name."""
-    ordered = sorted(champion.evaluation["per_sample"], key=lambda s: (-s["f05"], s["id"]))
+    ordered = sorted(champion.evaluation.per_sample, key=lambda crop: (-crop.f05, crop.id))
     if not ordered:
         raise InputError(f"{champion.model} seed {champion.seed} has no evaluated crop")
     return {"best": ordered[0], "median": ordered[len(ordered) // 2], "worst": ordered[-1]}[rank]
 
 
-def crop_cloud(results: Results, sample: Mapping[str, Any]) -> PointCloud:
-    """The points of a test crop; ``sample`` is its entry in ``per_sample`` of an evaluation."""
+def crop_cloud(results: Results, crop: str) -> PointCloud:
+    """The points of the test crop with that id."""
     from scenenet.dataset.zarr_store import StoreReader
     from scenenet.pointcloud import PointCloud, class_scheme
 
     split = read_table(results.folder / "split" / "split.csv").astype({"crop": str})
-    survey = split.loc[split["crop"] == sample["id"], "survey"].iloc[0]
+    survey = split.loc[split["crop"] == crop, "survey"].iloc[0]
     reader = StoreReader(results.folder / "crops" / survey / "manifest.json")
-    arrays = reader.get(sample["id"])
+    arrays = reader.get(crop)
     scheme = class_scheme(reader.manifest["codes"])
     return PointCloud(arrays["xyz"], arrays["classification"], scheme)
 

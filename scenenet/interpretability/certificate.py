@@ -6,10 +6,11 @@ result folder.
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
-from scenenet.interpretability.geneo_properties import Statement, certify
+from scenenet.interpretability.geneo_properties import certify
+from scenenet.interpretability.result import ModelCertificate, Statement
 from scenenet.models.model_file import read_model
 
 SCENE = "a pole of 15 m with an arm, two wires, two trees and bumpy ground, made by rule"
@@ -20,18 +21,13 @@ OF_CONVOLUTION = ("equivariant under translation", "equivariant under quarter tu
 it is a convolution, the second it would need a kernel for that nothing makes it have."""
 
 
-def certificate(model: str | Path) -> dict[str, Any]:
-    """All numbers of a model's certificate, and its statements.
+def certificate(model: str | Path) -> ModelCertificate:
+    """The certificate of a tuned model file, measured at the voxel size of the file.
 
-    Args:
-        model: a tuned model file; it is measured at the voxel size of its card.
+    A model without GENEOs has the statements of ``OF_CONVOLUTION`` only.
 
-    Returns:
-        model, seed, kind, voxel_size (m), scene, the numbers of
-        ``scenenet.interpretability.geneo_properties.Certificate``, and ``statements``: property,
-        thesis, holds,
-        text and value, a number that goes with the property. Of a model without GENEOs only those
-        of ``OF_CONVOLUTION``.
+    Raises:
+        InputError: the file is not a model.
     """
     trained, card = read_model(model)
     found = certify(trained, voxel_size=card.voxel_size, measurement=card.measurement, tau=card.tau)
@@ -42,24 +38,30 @@ def certificate(model: str | Path) -> dict[str, Any]:
         worst,
         found.l1,
         1.0,
-        # Between presences the property holds for any kernel, and no number goes with it.
+        # Between presences the property holds for any kernel, and no number belongs to it.
         found.measured_model if found.measurement == "density" else None,
         max((k.slice_sum for k in found.kernels if k.sums_to_zero), default=None),
         found.weight_sum,
     )
-    statements = [
-        {**vars(statement), "value": value}
+    statements = tuple(
+        replace(statement, value=value)
         for statement, value in zip(found.statements(), values, strict=False)
         if found.kernels or _asked_of_any(statement)
-    ]
-    return {
-        "model": card.name,
-        "seed": card.provenance.get("seed"),
-        "voxel_size": card.voxel_size,
-        "scene": SCENE,
-        **found.as_dict(),
-        "statements": statements,
-    }
+    )
+    numbers = asdict(found)
+    for name in ("kind", "half_voxel", "turns"):
+        del numbers[name]
+    return ModelCertificate(
+        model=card.name,
+        seed=card.provenance.get("seed"),
+        kind=found.kind,
+        voxel_size=card.voxel_size,
+        scene=SCENE,
+        half_voxel=found.half_voxel,
+        turns=found.turns,
+        statements=statements,
+        numbers=numbers,
+    )
 
 
 def _asked_of_any(statement: Statement) -> bool:

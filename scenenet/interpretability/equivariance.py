@@ -15,32 +15,13 @@ from scenenet.convolution.convolve import convolve
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
 from scenenet.dataset.voxels import MAX_VOXELS, Measurement, VoxelGrid, VoxelSample
+from scenenet.interpretability.result import Turn
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
 
 SHIFT = (2, 3, 5)
 """Whole voxels (z, y, x) of the translation that is measured."""
-
-
-@dataclass(frozen=True)
-class Turn:
-    """Answers to a scene and to the scene moved, at the same points.
-
-    Attributes:
-        degrees: turn about z; None for the shift by half a voxel.
-        mean_h: mean |difference| of H, as a share of the standard deviation of H.
-        mean_m: mean |difference| of M, in [0, 1].
-        largest_m: the largest.
-        decided_otherwise: share of those decided tower either way that are so in one alone; None
-            without tau, or where none is.
-    """
-
-    degrees: float | None
-    mean_h: float
-    mean_m: float
-    largest_m: float
-    decided_otherwise: float | None
 
 
 @dataclass(frozen=True)

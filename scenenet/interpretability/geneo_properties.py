@@ -36,8 +36,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -46,13 +46,13 @@ from scenenet.dataset.voxels import Measurement
 from scenenet.geneo import kernel_named
 from scenenet.interpretability.equivariance import (
     Scene,
-    Turn,
     exact_errors,
     kernel_turn_error,
     sample_scene,
     turns_of,
 )
 from scenenet.interpretability.nonexpansivity import random_pairs, worst_pair, worst_pair_of_model
+from scenenet.interpretability.result import Statement, Turn
 from scenenet.models.geneo_model import GeneoModel
 
 if TYPE_CHECKING:
@@ -89,16 +89,6 @@ class Kernel:
     slice_sum: float
     sums_to_zero: bool
     share: float
-
-
-@dataclass(frozen=True)
-class Statement:
-    """A property, where the thesis claims it, whether it holds for this model, and the numbers."""
-
-    property: str
-    thesis: str
-    holds: bool
-    text: str
 
 
 @dataclass(frozen=True)
@@ -167,10 +157,6 @@ class Certificate:
         if self.weight_sum is None:
             return False
         return not self.negative and abs(self.weight_sum - 1) <= CONVEX_ROUNDING
-
-    def as_dict(self) -> dict[str, Any]:
-        """All numbers, plain, and the statements."""
-        return asdict(self) | {"statements": [asdict(s) for s in self.statements()]}
 
     def statements(self) -> list[Statement]:
         """What holds and what does not, to be read by a person."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from scenenet.detection.survey_tower import SurveyTower
 from scenenet.pointcloud import add_dimensions
 from scenenet.prediction.predict import SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.summary import PredictionSummary
 
 if TYPE_CHECKING:
     import pyproj
@@ -24,42 +24,6 @@ if TYPE_CHECKING:
 PROBABILITY = "tower_probability"
 TOWER_ID = "tower_id"
 SHARE_PREFIX = "share_"
-
-
-@dataclass(frozen=True)
-class PredictionSummary:
-    """The summary of a prediction (``NAME.summary.json``).
-
-    Attributes:
-        survey: path of the survey, as given.
-        model: name of the model.
-        points: number of points.
-        towers: number of towers.
-        tau: detection threshold.
-        voxel_size_m: m.
-        kernel_size: (kz, ky, kx) in voxels.
-        tiles: number of tiles that hold a point.
-        crs: CRS of the survey; None where the file names none.
-        seconds: time of the prediction, files included, s.
-        settings: settings of the prediction, with those of ``detection``.
-        model_provenance: provenance of the model.
-    """
-
-    survey: str
-    model: str
-    points: int
-    towers: int
-    tau: float
-    voxel_size_m: float
-    kernel_size: list[int]
-    tiles: int
-    crs: str | None
-    seconds: float
-    settings: dict[str, Any]
-    model_provenance: dict[str, Any]
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def predict_to_files(

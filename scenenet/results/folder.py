@@ -6,16 +6,22 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pandas as pd
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
+from scenenet.detection.survey_tower import SurveyTower, read_towers
+from scenenet.evaluation.result import Evaluation
+from scenenet.interpretability.result import ModelCertificate
 from scenenet.models.settings import BOOSTED_TREES
+from scenenet.prediction.summary import PredictionSummary
 
 if TYPE_CHECKING:
     from scenenet.experiments.studies.settings import StudySettings
+
+Typed = TypeVar("Typed")
 
 HISTORY_MEASURES = frozenset({"epoch", "loss", "fidelity", "penalty", "seconds", "learning_rate"})
 """Columns of a training history that are not parameters of the model."""
@@ -40,7 +46,7 @@ class SeedResult:
     model: str
     kind: str
     seed: int
-    evaluation: Mapping[str, Any]
+    evaluation: Evaluation
     tuning: Mapping[str, Any] | None = None
     history: pd.DataFrame | None = None
     provenance: Mapping[str, Any] | None = None
@@ -51,7 +57,7 @@ class SeedResult:
     def alive(self) -> bool:
         """Whether the model is live: it detects a tower voxel (thesis 5.2.6: one CNN in five
         is)."""
-        return bool(self.evaluation["alive"])
+        return self.evaluation.alive
 
     @property
     def validation(self) -> Mapping[str, Any]:
@@ -69,6 +75,19 @@ class SeedResult:
         if self.history is None or "seconds" not in self.history:
             return None
         return float(self.history["seconds"].sum())
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A classified survey.
+
+    Attributes:
+        summary: what was classified, with which model.
+        towers: the tower list.
+    """
+
+    summary: PredictionSummary
+    towers: Sequence[SurveyTower]
 
 
 @dataclass(frozen=True)
@@ -137,7 +156,7 @@ class Results:
             InputError: it has not been evaluated, or a file is broken.
         """
         training = self.folder / "train" / model / f"seed-{seed}"
-        evaluation = read_result(self._evaluation(model, seed))
+        evaluation = read_typed(self._evaluation(model, seed), Evaluation.from_json)
         tuning = self.folder / "tune" / model / f"seed-{seed}.json"
         history, provenance = training / "history.csv", training / "provenance.json"
         resources = training / "resources.json"
@@ -157,9 +176,10 @@ class Results:
         """The best, median or worst test crop as voxels; None if there is none."""
         return self._if_there("interactive_crop", f"{rank}.json")
 
-    def certificate(self, model: str) -> Mapping[str, Any] | None:
+    def certificate(self, model: str) -> ModelCertificate | None:
         """Which properties of a GENEO a model has; None if that was not verified."""
-        return self._if_there("certificate", f"{model}.json")
+        path = self.folder / "certificate" / f"{model}.json"
+        return read_typed(path, ModelCertificate.from_json) if path.exists() else None
 
     def timing(self, model: str) -> Mapping[str, Any] | None:
         """Inference time of a model; None if it was not measured."""
@@ -175,7 +195,7 @@ class Results:
         paths = [self.folder / "boosted_trees" / f"seed-{seed}.json" for seed in self.seeds]
         found = [(seed, p) for seed, p in zip(self.seeds, paths, strict=True) if p.exists()]
         return [
-            SeedResult(BOOSTED_TREES, BOOSTED_TREES, seed, read_result(path))
+            SeedResult(BOOSTED_TREES, BOOSTED_TREES, seed, read_typed(path, Evaluation.from_json))
             for seed, path in found
         ]
 
@@ -221,8 +241,8 @@ class Results:
         path = self.folder / "split" / "split.csv"
         return read_table(path) if path.exists() else None
 
-    def prediction(self, survey: str) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
-        """Summary and tower list (GeoJSON) of a classified survey; None if it was not classified.
+    def prediction(self, survey: str) -> Prediction | None:
+        """Summary and tower list of a classified survey; None if it was not classified.
 
         Raises:
             InputError: one of the two files is there and the other is not.
@@ -231,7 +251,7 @@ class Results:
         summary, towers = folder / f"{survey}.summary.json", folder / f"{survey}.towers.geojson"
         if not summary.exists() and not towers.exists():
             return None
-        return read_result(summary), read_result(towers)
+        return Prediction(read_typed(summary, PredictionSummary.from_json), read_towers(towers))
 
     def provenances(self) -> list[tuple[str, Mapping[str, Any]]]:
         """Every provenance record with its path in the result folder, sorted.
@@ -295,6 +315,23 @@ def read_result(path: Path) -> Mapping[str, Any]:
     if not isinstance(data, Mapping):
         raise _unreadable(path, "is not a JSON object")
     return data
+
+
+def read_typed(path: Path, make: Callable[[Mapping[str, Any]], Typed]) -> Typed:
+    """Read a JSON result as its type.
+
+    Args:
+        path: the file.
+        make: the ``from_json`` of the type.
+
+    Raises:
+        InputError: the file is missing, is not a JSON object, or was written by another version.
+    """
+    data = read_result(path)
+    try:
+        return make(data)
+    except (KeyError, TypeError) as error:
+        raise _unreadable(path, f"is a result of another version ({error})") from None
 
 
 def read_table(path: Path) -> pd.DataFrame:

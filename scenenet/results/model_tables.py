@@ -7,6 +7,7 @@ the sample standard deviation over seeds.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pandas as pd
@@ -157,15 +158,20 @@ def certificate(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
     columns = ["model", "kind", "seed", "property", "thesis", "holds", "value", "found"]
     rows = []
     for model in results.models:
-        known = results.certificate(model) or {"statements": []}
-        for statement in known["statements"]:
+        known = results.certificate(model)
+        if known is None:
+            continue
+        for statement in known.statements:
             rows.append(
                 {
                     "model": model,
-                    "kind": known["kind"],
-                    "seed": known["seed"],
-                    **{name: statement[name] for name in ("property", "thesis", "holds", "value")},
-                    "found": statement["text"],
+                    "kind": known.kind,
+                    "seed": known.seed,
+                    "property": statement.property,
+                    "thesis": statement.thesis,
+                    "holds": statement.holds,
+                    "value": statement.value,
+                    "found": statement.text,
                 }
             )
     return pd.DataFrame(rows, columns=columns)
@@ -178,8 +184,8 @@ def turns(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
     rows = []
     for model in results.models:
         known = results.certificate(model)
-        moved = [] if known is None else [known["half_voxel"], *known["turns"]]
-        rows += [{"model": model} | {name: one[name] for name in columns[1:]} for one in moved]
+        moved = [] if known is None else [known.half_voxel, *known.turns]
+        rows += [{"model": model} | asdict(one) for one in moved]
     return pd.DataFrame(rows, columns=columns)
 
 

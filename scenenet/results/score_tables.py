@@ -28,17 +28,17 @@ def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
                "training_seconds"]  # fmt: skip
     rows = []
     for result in results.trained:
-        voxel, tower = result.evaluation["voxel"], result.evaluation["towers"]
+        voxel, tower = result.evaluation.voxel, result.evaluation.towers
         rows.append(
             (
                 result.model,
                 result.seed,
                 result.alive,
-                voxel["tau"],
+                voxel.tau,
                 result.validation.get("f05"),
-                *(voxel[name] for name in SCORES),
-                result.evaluation.get("average_precision"),
-                *(tower[name] for name in MATCH_SCORES),
+                *(getattr(voxel, name) for name in SCORES),
+                result.evaluation.average_precision,
+                *(getattr(tower, name) for name in MATCH_SCORES),
                 result.epochs,
                 result.seconds,
             )
@@ -82,7 +82,7 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
             "voxels": AT_TAU,
             "n_seeds": len(group),
             "live_share": sum(r.alive for r in group) / len(group),
-            "parameters": round(sum(r.evaluation["parameters"] for r in group) / len(group)),
+            "parameters": round(sum(r.evaluation.parameters or 0 for r in group) / len(group)),
         }
         rows.append(row | _mean_and_std(group, "voxel", SCORES))
     if results.trained:
@@ -117,7 +117,7 @@ def whole_towers(results: Results, thesis: Thesis | None = None) -> pd.DataFrame
 
 
 def _counts_whole_towers(group: list[SeedResult]) -> bool:
-    return bool(group[0].evaluation["whole_towers"])
+    return group[0].evaluation.whole_towers
 
 
 def tower_scores(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
@@ -160,7 +160,7 @@ def _mean_and_std(
 ) -> dict[str, float | None]:
     summary: dict[str, float | None] = {}
     for name in names:
-        values = pd.Series([r.evaluation[part][name] for r in group], dtype=float)
+        values = pd.Series([getattr(getattr(r.evaluation, part), name) for r in group], dtype=float)
         summary |= {name: values.mean(), f"{name}_std": values.std()}
     return summary
 

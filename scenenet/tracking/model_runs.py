@@ -101,7 +101,7 @@ def _datasets(result: SeedResult, dataset: str, source: str) -> list[DatasetReco
     if not inputs:
         return []
     fingerprint = digest(inputs)
-    tested = {"crops": result.evaluation["voxel"].get("n_samples")}
+    tested = {"crops": result.evaluation.voxel.n_samples}
     return [
         DatasetRecord(f"{dataset}, training", fingerprint, source, "training"),
         DatasetRecord(
@@ -159,13 +159,13 @@ def _history(result: SeedResult) -> tuple[dict[str, list[float]], list[int]]:
 
 
 def _final_metrics(result: SeedResult) -> dict[str, float | None]:
-    test, towers = result.evaluation["voxel"], result.evaluation["towers"]
-    metrics: dict[str, float | None] = {f"test_{name}": test[name] for name in DECISIVE_FIRST}
-    metrics["test_average_precision"] = result.evaluation.get("average_precision")
+    test, towers = result.evaluation.voxel, result.evaluation.towers
+    metrics: dict[str, float | None] = {f"test_{n}": getattr(test, n) for n in DECISIVE_FIRST}
+    metrics["test_average_precision"] = result.evaluation.average_precision
     validation = result.validation
     metrics |= {f"validation_{n}": validation[n] for n in DECISIVE_FIRST if n in validation}
-    metrics |= {f"towers_{name}": towers[name] for name in MATCH_SCORES}
-    metrics |= {"tau": test.get("tau"), "alive": float(result.alive)}
+    metrics |= {f"towers_{name}": getattr(towers, name) for name in MATCH_SCORES}
+    metrics |= {"tau": test.tau, "alive": float(result.alive)}
     return metrics
 
 
@@ -180,12 +180,12 @@ def _drawings(result: SeedResult) -> dict[str, Any]:
             training({f"seed {result.seed}": history}, path)
 
         drawings["figures/training.png"] = draw_training
-    if result.evaluation.get("pr_curve"):
+    if result.evaluation.pr_curve:
 
         def draw_curve(path: Path) -> None:
             from scenenet.figures.plots.curves import precision_recall
 
-            precision_recall({result.model: [result.evaluation["pr_curve"]]}, path)
+            precision_recall({result.model: [result.evaluation.pr_curve]}, path)
 
         drawings["figures/precision_recall.png"] = draw_curve
     return drawings
@@ -213,11 +213,13 @@ def _parent_record(
         if name.startswith("test_"):
             metrics |= _summary(f"{name}_live", live, of=name)
     metrics |= {"seeds": len(trained), "alive_share": len(live) / len(trained)}
+    trivial = [result.evaluation.voxel_trivial for result in trained]
     for name in SCORES:
-        metrics[f"trivial_{name}"] = fmean(r.evaluation["voxel_trivial"][name] for r in trained)
+        metrics[f"trivial_{name}"] = fmean(getattr(scores, name) for scores in trivial)
     if champion is not None:
         metrics["champion_seed"] = champion.seed
-        metrics |= {f"champion_test_{n}": champion.evaluation["voxel"][n] for n in SCORES}
+        best = champion.evaluation.voxel
+        metrics |= {f"champion_test_{name}": getattr(best, name) for name in SCORES}
     common = {
         name: value
         for name, value in children[0].params.items()

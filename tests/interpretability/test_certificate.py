@@ -8,6 +8,7 @@ import pytest
 
 from scenenet.interpretability.certificate import certificate
 from scenenet.interpretability.geneo_properties import certify
+from scenenet.interpretability.result import ModelCertificate
 from scenenet.models.cnn import CNN
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard, write_model
@@ -43,18 +44,19 @@ def test_it_is_that_of_the_model_at_the_voxel_size_of_its_card(field, card, tmp_
     write_model(path, MetricSceneNet(metric=MetricSettings()), small)
     model, _ = read_model(path)
     found = certificate(path)
-    assert found["l1"] == certify(model, voxel_size=1.5, tau=0.7).l1
-    assert (found["model"], found["seed"], found["voxel_size"]) == ("m", 4, 1.5)
+    assert found.numbers["l1"] == certify(model, voxel_size=1.5, tau=0.7).l1
+    assert (found.model, found.seed, found.voxel_size) == ("m", 4, 1.5)
 
 
 def test_each_statement_has_the_number_that_goes_with_it(field):
-    values = {s["property"]: s["value"] for s in field["statements"]}
+    values = {s.property: s.value for s in field.statements}
+    numbers = field.numbers
     assert len(values) == 8
-    assert values["equivariant under translation by whole voxels"] == field["translation_error"]
-    assert values["equivariant under quarter turns about z"] == field["quarter_turn_error"]
-    assert values["the observer H is non-expansive as it stands"] == field["l1"]
-    assert values["convex combination of GENEOs"] == field["weight_sum"]
-    turned = [t["mean_h"] for t in field["turns"] if t["degrees"] % 90]
+    assert values["equivariant under translation by whole voxels"] == numbers["translation_error"]
+    assert values["equivariant under quarter turns about z"] == numbers["quarter_turn_error"]
+    assert values["the observer H is non-expansive as it stands"] == numbers["l1"]
+    assert values["convex combination of GENEOs"] == numbers["weight_sum"]
+    turned = [turn.mean_h for turn in field.turns if turn.degrees % 90]
     assert values["equivariant under any rotation about z"] == max(turned)
     assert values["zero-sum kernels sum to zero"] < 1e-4
 
@@ -62,7 +64,7 @@ def test_each_statement_has_the_number_that_goes_with_it(field):
 def test_of_a_cnn_only_what_a_convolution_has_is_said(card, tmp_path):
     path = tmp_path / "m.safetensors"
     write_model(path, CNN(kernel_size=(5, 5, 5)), card)
-    told = {s["property"]: s["holds"] for s in certificate(path)["statements"]}
+    told = {s.property: s.holds for s in certificate(path).statements}
     assert told == {
         "equivariant under translation by whole voxels": True,
         "equivariant under quarter turns about z": False,
@@ -70,4 +72,16 @@ def test_of_a_cnn_only_what_a_convolution_has_is_said(card, tmp_path):
 
 
 def test_it_is_plain_and_the_same_each_time(field, card, tmp_path):
-    assert json.loads(json.dumps(field))["statements"][0]["holds"] is True
+    read = ModelCertificate.from_json(json.loads(json.dumps(field.to_json(), allow_nan=False)))
+    assert read.statements == field.statements and read.turns == field.turns
+    assert read.half_voxel == field.half_voxel
+    assert read.numbers["kernels"][0]["name"] == "cylinder"
+    assert set(read.numbers) == set(field.numbers)
+    assert read.statements[0].holds is True
+
+
+def test_a_certificate_with_a_missing_number_is_refused(field):
+    told = field.to_json()
+    del told["half_voxel"]["mean_h"]
+    with pytest.raises(TypeError, match="mean_h"):
+        ModelCertificate.from_json(told)

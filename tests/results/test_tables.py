@@ -243,7 +243,7 @@ def test_both_ways_to_count_are_in_one_row(results: Results, thesis: Thesis):
     expected = np.mean([0.5 + 0.1 * seed for seed in results.seeds])
     assert table.loc["scenenet", "towers_f05"] == pytest.approx(expected)
     seeds = tables.seeds(fresh)
-    by_observer = [r.evaluation["voxel_observer"]["f05"] for r in fresh.of_model("scenenet")]
+    by_observer = [r.evaluation.voxel_observer.f05 for r in fresh.of_model("scenenet")]
     assert table.loc["scenenet", "tau_f05"] == pytest.approx(np.mean(by_observer))
     models = tables.models(fresh, thesis).set_index("model")
     assert set(models.loc["scenenet", "voxels"]) == {WHOLE_TOWERS}

@@ -48,14 +48,14 @@ def overview(context: ReportContext) -> Section:
         ]
     predicted = [p for survey in results.predicted if (p := results.prediction(survey))]
     if predicted:
-        found = sum(len(towers["features"]) for _, towers in predicted)
+        found = sum(len(prediction.towers) for prediction in predicted)
         facts.append(("towers found in new surveys", write(found, "count")))
     return Section("overview", "Summary", [*blocks[:2], Facts(facts), *blocks[2:]])
 
 
 def _task(context: ReportContext, first: Mapping[Any, Any]) -> str:
     """What was trained and what was tested."""
-    n_crops = context.results.of_model(first["model"])[0].evaluation["voxel"]["n_samples"]
+    n_crops = context.results.of_model(first["model"])[0].evaluation.voxel.n_samples
     return (
         "This run trains models to find the towers of power lines in airborne LiDAR point clouds. "
         "The points around each labelled tower are cut out (a crop) and put on a grid of voxels. A "

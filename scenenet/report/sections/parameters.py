@@ -80,7 +80,8 @@ def certificate(context: ReportContext) -> Section | None:
         Column("thesis", "thesis"),
     ]
     for model, rows in frame.groupby("model", sort=False):
-        scene = (context.results.certificate(str(model)) or {}).get("scene", "a synthetic scene")
+        known = context.results.certificate(str(model))
+        scene = "a synthetic scene" if known is None else known.scene
         if rows["kind"].iloc[0] == "cnn":
             basis = (
                 f"{model} is a convolution, so it is equivariant under translation by "

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
 
 import pandas as pd
 
 from scenenet.core.files import digest
-from scenenet.detection.survey_tower import TOWER_COLUMNS
+from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower, TowerColumn
 from scenenet.report.blocks import (
     Block,
     Column,
@@ -61,15 +60,14 @@ def predictions(context: ReportContext) -> Section | None:
         found = context.results.prediction(survey)
         if found is None:
             continue
-        summary, geojson = found
         facts = [
-            (label, write(summary[name], how))
+            (label, write(value, how))
             for name, label, how in SUMMARY_FACTS
-            if summary.get(name) is not None
+            if (value := getattr(found.summary, name)) is not None
         ]
         blocks += [Heading(survey), Facts(facts)]
         blocks += context.figures_of(survey, "predictions")
-        blocks.append(_tower_list(survey, geojson))
+        blocks.append(_tower_list(survey, found.towers))
     if not blocks:
         return None
     note = Text(
@@ -80,38 +78,37 @@ def predictions(context: ReportContext) -> Section | None:
     return Section("predictions", "Classified surveys", [note, *blocks])
 
 
-def _tower_list(survey: str, geojson: Mapping[str, Any]) -> Block:
-    features = geojson["features"]
-    if not features:
+def _tower_list(survey: str, towers: Sequence[SurveyTower]) -> Block:
+    if not towers:
         return Text(f"No tower was found in {survey}.")
+    shown = towers[:TOWERS_LISTED]
+    listed = [column for column in TOWER_COLUMNS if column.heading is not None]
     rows = []
-    for feature in features[:TOWERS_LISTED]:
-        x, y = feature["geometry"]["coordinates"][:2]
-        properties = dict(feature["properties"])
-        shares = properties.pop("contributions", {})
-        rows.append({"x": x, "y": y, **properties}
-                    | {f"share.{name}": 100 * share for name, share in shares.items()})  # fmt: skip
+    for tower in shown:
+        own = {f"share.{name}": 100 * share for name, share in tower.contributions.items()}
+        rows.append({column.name: column.value(tower) for column in listed} | own)
     frame = pd.DataFrame(rows)
-    known = [
-        Column(c.name, f"{c.heading} [m]" if c.unit == "m" else c.heading, TOWER_FORMATS[c.unit])
-        for c in TOWER_COLUMNS
-        if c.heading is not None
-    ]
-    shares = [
+    columns = [_tower_column(column) for column in listed]
+    columns += [
         Column(name, f"{name.removeprefix('share.').replace('_', ' ')} [%]", "share")
         for name in frame.columns
         if name.startswith("share.")
     ]
-    columns = [c for c in known if c.name in frame] + shares
-    more = f" The first {TOWERS_LISTED} of {len(features)}." if len(features) > len(rows) else ""
-    caption = (
-        f"Towers found in {survey}."
-        + (" The last columns are the contributions of each GENEO: positive raises the "
-        "probability, "
-           "negative lowers it." if shares else "")
-        + more
-    )  # fmt: skip
-    return table(frame, columns, caption, f"predict/{survey}/{survey}.towers.geojson")
+    caption = f"Towers found in {survey}."
+    if len(columns) > len(listed):
+        caption += (
+            " The last columns are the contributions of each GENEO: positive raises the "
+            "probability, negative lowers it."
+        )
+    if len(towers) > len(shown):
+        caption += f" The first {TOWERS_LISTED} of {len(towers)}."
+    source = f"predict/{survey}/{survey}.towers.geojson"
+    return table(frame, columns, caption, source)
+
+
+def _tower_column(column: TowerColumn) -> Column:
+    heading = str(column.heading) + (" [m]" if column.unit == "m" else "")
+    return Column(column.name, heading, TOWER_FORMATS[column.unit])
 
 
 def provenance(context: ReportContext) -> Section | None:

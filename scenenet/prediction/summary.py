@@ -1,0 +1,55 @@
+"""The summary of a prediction, as a type and as the JSON file beside the classified survey.
+
+It imports neither torch nor the models, so that figures and the report do not depend on them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+
+@dataclass(frozen=True)
+class PredictionSummary:
+    """The summary of a prediction (``NAME.summary.json``).
+
+    Attributes:
+        survey: path of the survey, as given.
+        model: name of the model.
+        points: number of points.
+        towers: number of towers.
+        tau: detection threshold.
+        voxel_size_m: m.
+        kernel_size: (kz, ky, kx) in voxels.
+        tiles: number of tiles that hold a point.
+        crs: CRS of the survey; None where the file names none.
+        seconds: time of the prediction, files included, s.
+        settings: settings of the prediction, with those of ``detection``.
+        model_provenance: provenance of the model.
+    """
+
+    survey: str
+    model: str
+    points: int
+    towers: int
+    tau: float
+    voxel_size_m: float
+    kernel_size: list[int]
+    tiles: int
+    crs: str | None
+    seconds: float
+    settings: dict[str, Any]
+    model_provenance: dict[str, Any]
+
+    def to_json(self) -> dict[str, Any]:
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> PredictionSummary:
+        """The summary that ``to_json`` gave.
+
+        Raises:
+            KeyError: a value is missing. Values that this version does not know are ignored.
+        """
+        return cls(**{field.name: data[field.name] for field in fields(cls)})

@@ -1,4 +1,4 @@
-"""Group-equivariant non-expansive operators: the kernels that hold the knowledge (thesis 4.4)."""
+"""Group-equivariant non-expansive operators: kernels that encode prior knowledge (thesis 4.4)."""
 
 from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, zero_sum
 from scenenet.geneo.registry import kernel_named, kernel_names, register

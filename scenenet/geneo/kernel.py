@@ -1,4 +1,4 @@
-"""What a GENEO kernel is: a function of space with shape parameters, sampled on a voxel lattice."""
+"""GENEO kernels: functions of space with shape parameters, sampled on a voxel lattice."""
 
 from __future__ import annotations
 
@@ -10,14 +10,10 @@ from typing import ClassVar
 import torch
 from torch import Tensor
 
-from scenenet.geneo.sentences import Sentence
+from scenenet.geneo.sentences import Sentence, body_radius
 
-BASE = 2.0
-"""Radius in voxels that a tower's body has by hand: half of the mean width of 4.15 m (thesis 5.1.2)
-in voxels of about a metre, as a crop has at 64^3."""
-
-THINNEST = 1e-6
-"""Least sigma of a shell, in squared units of length."""
+MIN_SIGMA = 1e-6
+"""Smallest sigma of a shell, in squared units of length."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +22,15 @@ class ShapeParameter:
 
     Attributes:
         name: its symbol in the thesis, spelt out (``r``, ``sigma``, ``omega``).
-        low, high: the range it is drawn from at the start of training, in units of ``unit``.
+        low, high: the range of its initial value, in ``unit``.
         unit: ``voxel``, ``voxel^2`` or ``1``.
-        meaning: what it says about a tower, as part of a sentence.
-        metric: the range it stays within where kernels are in metres, in ``metric_unit``; low and
-            high, and never below a thousandth of high, if None.
-        by_hand: what somebody who knows towers would set it to, in ``unit`` (thesis 5.3.4,
-            "handcrafted values"); the middle of the range if None.
-        sentence: its value in metres in words (thesis 5.2.2); ``meaning`` and the value if None.
+        meaning: what it stands for in the scene, as a noun phrase.
+        metric: its bounds for kernels in metres, in ``metric_unit``. None takes low and high, with
+            low raised to at least a thousandth of high.
+        by_hand: the value that a person who knows towers would choose, in ``unit`` (thesis 5.3.4,
+            "handcrafted values"); None takes the middle of the range.
+        sentence: describes its value in metres (thesis 5.2.2); None takes ``meaning`` and the
+            value.
     """
 
     name: str
@@ -47,33 +44,48 @@ class ShapeParameter:
 
     @property
     def handcrafted(self) -> float:
-        """Its value by hand, in ``unit``."""
+        """The handcrafted value, in ``unit``."""
         return (self.low + self.high) / 2 if self.by_hand is None else self.by_hand
 
     @property
     def metric_unit(self) -> str:
-        """``m``, ``m^2`` or ``1``: its unit where kernels are in metres."""
+        """``m``, ``m^2`` or ``1``: its unit for kernels in metres."""
         return self.unit.replace("voxel", "m")
 
     @property
     def metric_range(self) -> tuple[float, float]:
-        """Bounds above zero, in ``metric_unit``."""
+        """Positive bounds, in ``metric_unit``."""
         return self.metric or (max(self.low, 1e-3 * self.high), self.high)
+
+
+BODY_RADIUS = ShapeParameter(
+    "r",
+    0.2,
+    2.0,
+    "voxel",
+    "radius of the tower's body",
+    metric=(0.1, 1.5),
+    by_hand=2.0,
+    sentence=body_radius,
+)
+"""Radius of a tower's body, which the cylinder and the arrow share. The handcrafted value is half
+the mean width of 4.15 m (thesis 5.1.2) in voxels of about a metre, the size in a crop at 64^3."""
 
 
 @dataclass(frozen=True)
 class Lattice:
-    """The places at which a kernel is sampled, in voxels or in metres.
+    """The positions at which a kernel is sampled, in voxels or in metres.
 
     The kernel's centre lies on element ``(k - 1) // 2`` of each axis, the element that the
-    convolution puts on the voxel it answers for (see ``scenenet.convolution.convolve``). An even
-    size has one more element on the high side; so no size shifts the answer by half a voxel.
+    convolution aligns with the output voxel (see ``scenenet.convolution.convolve``). An even size
+    has one more element on the high side, so no size shifts the response by half a voxel.
 
     Attributes:
         size: (kz, ky, kx).
         z: (kz, 1, 1) height above the centre.
         planar_squared: (1, ky, kx) squared distance from the vertical axis, ||pi_-3(x - c)||^2.
-        inside: (1, ky, kx) of 0 and 1, where the kernel is; None for all of it.
+        inside: (1, ky, kx), 1 in the support of the kernel and 0 elsewhere; None if the support is
+            the whole box.
     """
 
     size: tuple[int, int, int]
@@ -87,7 +99,11 @@ class Lattice:
         size: tuple[int, int, int],
         dtype: torch.dtype = torch.float32,
     ) -> Lattice:
-        """The lattice of a kernel of ``size`` (kz, ky, kx), each at least 1."""
+        """The lattice in voxels of a kernel of ``size`` (kz, ky, kx), each at least 1.
+
+        Raises:
+            ValueError: the size is not three positive integers.
+        """
         if len(size) != 3 or min(size) < 1:
             raise ValueError(f"kernel size must be three positive integers, not {size}")
         z, y, x = (torch.arange(k, dtype=dtype) - (k - 1) // 2 for k in size)
@@ -102,8 +118,8 @@ class Lattice:
         voxel_size: float,
         dtype: torch.dtype = torch.float32,
     ) -> Lattice:
-        """The same in metres, within ``radius`` of the vertical axis; a disc has no corners that
-        would stand out when the scene is turned.
+        """The lattice in metres, limited to ``radius`` around the vertical axis. A disc has no
+        corners, which would change the response when the scene rotates.
 
         Args:
             size: (kz, ky, kx), all odd.
@@ -127,9 +143,9 @@ class GeneoKernel(ABC):
     ``scenenet.geneo.register``; no other file changes.
 
     Attributes:
-        name: in settings, model files and tables.
-        parameters: the shape parameters, in the order of tables.
-        sums_to_zero: whether every horizontal slice is meant to sum to zero (thesis 4.4.1); the
+        name: its name in settings, model files and tables.
+        parameters: the shape parameters, in the order in which tables list them.
+        sums_to_zero: whether every horizontal slice sums to zero by design (thesis 4.4.1); the
             certificate of a model verifies it.
     """
 
@@ -139,12 +155,11 @@ class GeneoKernel(ABC):
 
     @abstractmethod
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
-        """The kernel's values on the lattice.
+        """The kernel's values on the lattice; differentiable in every shape parameter.
 
         Args:
-            lattice: where to sample.
-            shape: a 0-dimensional tensor for each of ``parameters``; the answer is differentiable
-                in every one.
+            lattice: the positions.
+            shape: a 0-dimensional tensor for each of ``parameters``, by name.
 
         Returns:
             (kz, ky, kx), axes z (up), y, x.
@@ -152,15 +167,15 @@ class GeneoKernel(ABC):
 
 
 def zero_sum(kernel: Tensor, inside: Tensor | None = None) -> Tensor:
-    """The kernel with its mean taken off each horizontal slice (thesis 4.4.1: "normalized").
+    """The kernel less the mean of each horizontal slice (thesis 4.4.1: "normalized").
 
-    A kernel that sums to zero answers nothing to uniform surroundings and punishes points where
-    the pattern has none. Each slice is balanced on its own, so a scene that is uniform in the plane
-    but changes with height, as bare ground does, is answered with zero as well.
+    A kernel that sums to zero gives no response to uniform surroundings, and a negative one to
+    points where its pattern has none. Each slice is balanced on its own, so a scene that is uniform
+    in the plane but changes with height, such as bare ground, gives no response either.
 
     Args:
         kernel: (kz, ky, kx).
-        inside: (1, ky, kx) of 0 and 1, ``Lattice.inside``: elsewhere the kernel is zero.
+        inside: (1, ky, kx) of 0 and 1, ``Lattice.inside``; the kernel is zero where it is 0.
 
     Returns:
         (kz, ky, kx), each [z] summing to zero.
@@ -172,11 +187,11 @@ def zero_sum(kernel: Tensor, inside: Tensor | None = None) -> Tensor:
 
 
 def gaussian_shell(squared_distance: Tensor, squared_radius: Tensor, sigma: Tensor) -> Tensor:
-    """exp(-(d^2 - r^2)^2 / (2 sigma^2)): one on the shell of radius r, falling off on both sides.
+    """exp(-(d^2 - r^2)^2 / (2 sigma^2)): 1 at radius r, decreasing on both sides.
 
-    The thesis compares squared lengths, so sigma is a squared length as well. One that is nearly 0,
-    as a penalty leaves where it was negative, counts as ``THINNEST``: there is no shell to speak of
-    left, but a number and a slope of 0 and not the quotient of two zeros.
+    The thesis compares squared lengths, so sigma is a squared length as well. Where |sigma| is
+    below ``MIN_SIGMA``, which the penalty on negative parameters can cause, ``MIN_SIGMA`` is used:
+    the values stay finite and the gradients are 0 instead of 0 / 0.
     """
-    spread = 2 * sigma.square().clamp(min=THINNEST**2)
+    spread = 2 * sigma.square().clamp(min=MIN_SIGMA**2)
     return torch.exp(-((squared_distance - squared_radius) ** 2) / spread)

@@ -1,4 +1,4 @@
-"""The kernels there are, by name."""
+"""All kernels, by name."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ _KERNELS: dict[str, GeneoKernel] = {}
 
 
 def register(kernel: type[GeneoKernel]) -> type[GeneoKernel]:
-    """Class decorator: make ``kernel`` known under its ``name``.
+    """Class decorator: register ``kernel`` under its ``name``.
 
     Raises:
-        ValueError: the name is taken by another class.
+        ValueError: another class has this name.
     """
     known = _KERNELS.get(kernel.name)
     if known is not None and type(known).__qualname__ != kernel.__qualname__:
@@ -34,6 +34,7 @@ def _discover() -> None:
 
 
 def kernel_names() -> list[str]:
+    """The names of all kernels, in alphabetical order."""
     _discover()
     return sorted(_KERNELS)
 
@@ -42,7 +43,7 @@ def kernel_named(name: str) -> GeneoKernel:
     """The kernel called ``name``.
 
     Raises:
-        InputError: there is none; the message lists those there are.
+        InputError: there is none; the message lists the known names.
     """
     _discover()
     try:

@@ -1,4 +1,4 @@
-"""Helpers for the sentences that say in words what a kernel's parameters mean."""
+"""Helpers for sentences that describe the parameters of a kernel (thesis 5.2.2)."""
 
 from __future__ import annotations
 
@@ -7,32 +7,31 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 Numbers = Mapping[str, float]
-"""The parameters of one kernel by their symbol, in metres, square metres or without unit."""
+"""The parameters of one kernel by name, in m, m^2 or without unit."""
 
 
-class Surroundings(NamedTuple):
-    """What a length is put beside.
+class Reference(NamedTuple):
+    """Lengths that the sentences compare with.
 
     Attributes:
-        step: m, what a kernel's height is counted in: the voxel it was trained on, or a metre.
-        tower_width: m, mean over the labelled towers; None where nobody measured them.
+        step: m, vertical step of the kernel: edge of the training voxels, or one metre.
+        tower_width: m, mean over the labelled towers; None if it was not measured.
     """
 
     step: float = 1.0
     tower_width: float | None = None
 
 
-ALONE = Surroundings()
-
-Sentence = Callable[[Numbers, Surroundings], str]
-"""What the value of a parameter means, in words."""
+Sentence = Callable[[Numbers, Reference], str]
+"""Describes the value of a parameter, given all parameters of its kernel."""
 
 
 HALF = math.sqrt(2 * math.log(2))
-"""A shell is at half its height where |d^2 - r^2| is so many sigma."""
+"""Value of |d^2 - r^2| / sigma at which a shell is half as high as at its radius."""
 
 
 def m(length: float) -> str:
+    """A length in m with its unit, to two significant digits or so."""
     return f"{length:.1f} m" if length >= 0.95 else f"{length:.2f} m"
 
 
@@ -42,12 +41,24 @@ def shell(radius: float, sigma: float) -> tuple[float, float]:
     return math.sqrt(max(radius**2 - reach, 0.0)), math.sqrt(radius**2 + reach)
 
 
-def between(inner: float, outer: float, of: str) -> str:
-    return f"within {m(outer)} of {of}" if inner == 0 else f"{m(inner)} to {m(outer)} from {of}"
+def shell_width(n: Numbers, centre: str, subtracted: str) -> str:
+    """Describes sigma: where a shell around ``centre`` has at least half its highest weight.
+
+    Args:
+        n: with ``r`` and ``sigma``.
+        subtracted: what the kernel subtracts from the shell.
+    """
+    inner, outer = shell(n["r"], n["sigma"])
+    where = f"within {m(outer)} of" if inner == 0 else f"{m(inner)} to {m(outer)} from"
+    return (
+        f"points {where} {centre} have at least half the highest weight, before {subtracted} is "
+        "subtracted"
+    )
 
 
-def body_radius(n: Numbers, beside: Surroundings) -> str:
+def body_radius(n: Numbers, reference: Reference) -> str:
+    """Describes the radius ``r`` of a tower's body."""
     width = 2 * abs(n["r"])
-    known = beside.tower_width
+    known = reference.tower_width
     share = f", {width / known:.0%} of the mean width of a labelled tower," if known else ""
-    return f"a column {m(width)} wide{share} speaks most for a tower"
+    return f"a column {m(width)} wide{share} gives the strongest response"

@@ -1,7 +1,7 @@
-"""The certificate of a model file: which promises of a GENEO it keeps (thesis 3.4, 4.3 to 4.5).
+"""The certificate of a model file: which GENEO properties it has (thesis 3.4, 4.3 to 4.5).
 
-``scenenet.interpretability.geneo_properties`` works it out; here it is brought to what stands in a
-result folder.
+``scenenet.interpretability.geneo_properties`` measures the properties; this module turns them into
+the content of the JSON file.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from scenenet.interpretability.geneo_properties import certify
 from scenenet.interpretability.result import ModelCertificate, Statement
 from scenenet.models.model_file import read_model
 
-SCENE = "a pole of 15 m with an arm, two wires, two trees and bumpy ground, made by rule"
-"""What every model is measured on, so that two certificates can be compared."""
+SCENE = "a generated pole of 15 m with an arm, two conductors, two trees and uneven ground"
+"""The scene on which every model is measured, so that certificates are comparable."""
 
 OF_CONVOLUTION = ("equivariant under translation", "equivariant under quarter turns")
-"""Beginnings of the properties that are asked of a model without GENEOs: the first it has because
-it is a convolution, the second it would need a kernel for that nothing makes it have."""
+"""First words of the properties that are verified for a model without GENEOs. Every convolution
+has the first one. The second one needs a symmetric kernel, which such a model need not have."""
 
 
 def certificate(model: str | Path) -> ModelCertificate:
@@ -38,7 +38,7 @@ def certificate(model: str | Path) -> ModelCertificate:
         worst,
         found.l1,
         1.0,
-        # Between presences the property holds for any kernel, and no number belongs to it.
+        # For presence the property holds with any kernel, so no number supports it.
         found.measured_model if found.measurement == "density" else None,
         max((k.slice_sum for k in found.kernels if k.sums_to_zero), default=None),
         found.weight_sum,
@@ -46,7 +46,7 @@ def certificate(model: str | Path) -> ModelCertificate:
     statements = tuple(
         replace(statement, value=value)
         for statement, value in zip(found.statements(), values, strict=False)
-        if found.kernels or _asked_of_any(statement)
+        if found.kernels or _of_convolution(statement)
     )
     numbers = asdict(found)
     for name in ("kind", "half_voxel", "turns"):
@@ -64,5 +64,5 @@ def certificate(model: str | Path) -> ModelCertificate:
     )
 
 
-def _asked_of_any(statement: Statement) -> bool:
+def _of_convolution(statement: Statement) -> bool:
     return statement.property.startswith(OF_CONVOLUTION)

@@ -1,4 +1,5 @@
-"""How far a model's answers move with the scene (thesis 4.1, 4.4.1, Eq. 3.1)."""
+"""Measures how equivariant a model is: whether its output moves with the scene (thesis 4.1, 4.4.1,
+Eq. 3.1)."""
 
 from __future__ import annotations
 
@@ -21,12 +22,18 @@ if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
 
 SHIFT = (2, 3, 5)
-"""Whole voxels (z, y, x) of the translation that is measured."""
+"""The measured translation, in whole voxels (z, y, x)."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """Points about their vertical axis, and how to lay them on a grid that holds every turn."""
+    """Points centred on a vertical axis, and a grid that holds them at every rotation.
+
+    Attributes:
+        xyz: (N, 3) m, centred.
+        grid: with the axis in the middle of a voxel column.
+        measurement: phi of the voxels.
+    """
 
     xyz: np.ndarray
     grid: VoxelGrid
@@ -34,37 +41,43 @@ class Scene:
 
     @classmethod
     def of(cls, points: np.ndarray, voxel_size: float, measurement: Measurement) -> Scene:
+        """The scene of points (N, 3) xyz, m.
+
+        Raises:
+            InputError: there are no points, or the grid needs more than ``MAX_VOXELS`` voxels.
+        """
         if len(points) == 0:
             raise InputError("there are no points to measure equivariance on")
         middle = (points.min(axis=0) + points.max(axis=0)) / 2
         xyz = points - middle
         radius = float(np.hypot(xyz[:, 0], xyz[:, 1]).max())
-        # Odd, so that the axis runs through the middle of a voxel; half a voxel to spare on top.
+        # Odd, so that the axis is in the middle of a voxel; half a voxel larger than needed.
         n = 2 * math.ceil(radius / voxel_size + 0.5) + 1
         nz = 2 * math.ceil(float(xyz[:, 2].max()) / voxel_size + 0.5) + 1
         if float(n) * n * nz > MAX_VOXELS:
             raise InputError(
-                f"{2 * radius:.0f} m across need more than {MAX_VOXELS} voxels of {voxel_size:g} m",
-                remedy="Take a crop, or larger voxels",
+                f"a scene {2 * radius:.0f} m across needs more than {MAX_VOXELS} voxels of "
+                f"{voxel_size:g} m",
+                remedy="Use a smaller scene or larger voxels",
             )
         origin = (-n * voxel_size / 2, -n * voxel_size / 2, -nz * voxel_size / 2)
         return cls(xyz, VoxelGrid(origin, voxel_size, (nz, n, n)), measurement)
 
-    def laid(self, xyz: np.ndarray) -> tuple[Occupancy, np.ndarray]:
-        """The points on the grid, and the flat position of each."""
+    def voxelised(self, xyz: np.ndarray) -> tuple[Occupancy, np.ndarray]:
+        """The points (N, 3) on the grid, and the flat voxel position (N,) of each point."""
         at = self.grid.voxel_of(np.ascontiguousarray(xyz))
         index, count = np.unique(at, return_counts=True)
         sample = VoxelSample("", self.grid, index, count, np.zeros(len(index), bool))
         return Occupancy.of_grids([index], [sample.phi(self.measurement)], self.grid.shape), at
 
     def turned(self, degrees: float) -> np.ndarray:
-        """(N, 3), turned about z."""
+        """(N, 3) m, the points rotated about z."""
         c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
         return self.xyz @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
 
 
 def sample_scene(seed: int = 0) -> np.ndarray:
-    """(N, 3) xyz, m: a pole of 15 m with an arm and two wires, and two trees, on bumpy ground."""
+    """(N, 3) xyz, m: a 15 m pole with an arm and two conductors, two trees, uneven ground."""
     rng = np.random.default_rng(seed)
     ground = rng.uniform(-20, 20, (6000, 2))
     bumps = 0.5 * np.sin(ground[:, 0] / 6) * np.cos(ground[:, 1] / 8)
@@ -83,18 +96,18 @@ def sample_scene(seed: int = 0) -> np.ndarray:
 
 def exact_errors(kernel: Tensor, scene: Scene) -> tuple[float, float]:
     """Errors of H under ``SHIFT`` and under the worst quarter turn, as shares of max |H|."""
-    occupancy, _ = scene.laid(scene.xyz)
-    answer = convolve(occupancy, kernel)[0]
-    largest = float(answer.abs().max()) or 1.0
+    occupancy, _ = scene.voxelised(scene.xyz)
+    observed = convolve(occupancy, kernel)[0]
+    largest = float(observed.abs().max()) or 1.0
     dense = occupancy.dense()[0]
-    # Room on the high sides, so that nothing leaves the grid.
+    # Padding on the high sides keeps the shifted scene inside the grid.
     (dz, dy, dx), (nz, ny, nx) = SHIFT, scene.grid.shape
-    roomy = torch.nn.functional.pad(dense, (0, dx, 0, dy, 0, dz))
-    here = answer_of(kernel, roomy)
-    there = answer_of(kernel, torch.roll(roomy, SHIFT, (0, 1, 2)))
-    shifted = float((there[dz:, dy:, dx:] - here[:nz, :ny, :nx]).abs().max())
+    padded = torch.nn.functional.pad(dense, (0, dx, 0, dy, 0, dz))
+    before = response(kernel, padded)
+    after = response(kernel, torch.roll(padded, SHIFT, (0, 1, 2)))
+    shifted = float((after[dz:, dy:, dx:] - before[:nz, :ny, :nx]).abs().max())
     quarters = [
-        answer_of(kernel, torch.rot90(dense, q, (1, 2))) - torch.rot90(answer, q, (1, 2))
+        response(kernel, torch.rot90(dense, q, (1, 2))) - torch.rot90(observed, q, (1, 2))
         for q in (1, 2, 3)
     ]
     return shifted / largest, max(float(q.abs().max()) for q in quarters) / largest
@@ -103,11 +116,13 @@ def exact_errors(kernel: Tensor, scene: Scene) -> tuple[float, float]:
 def turns_of(
     model: VoxelModel, scene: Scene, angles: Sequence[float], tau: float | None
 ) -> tuple[Turn, tuple[Turn, ...]]:
-    """The scene moved by half a voxel, and turned: at each point, before against after."""
+    """Differences after a shift by half a voxel along x and y, and after a rotation by each of
+    ``angles`` (degrees)."""
     kernel, bias = model.observer()
 
-    def answers(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        occupancy, at = scene.laid(xyz)
+    def outputs(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """H and M at the points, each (N,)."""
+        occupancy, at = scene.voxelised(xyz)
         observed = convolve(occupancy, kernel)
         if bias is not None:
             observed = observed + bias
@@ -117,30 +132,30 @@ def turns_of(
             probability.reshape(-1).numpy()[at].astype(float),
         )
 
-    h0, m0 = answers(scene.xyz)
+    h0, m0 = outputs(scene.xyz)
     spread = float(h0.std()) or 1.0
 
-    def against(xyz: np.ndarray, degrees: float | None) -> Turn:
-        h, m = answers(xyz)
+    def compare(xyz: np.ndarray, degrees: float | None) -> Turn:
+        h, m = outputs(xyz)
         otherwise = None
         if tau is not None and (either := (m >= tau) | (m0 >= tau)).any():
             otherwise = float(((m >= tau) != (m0 >= tau))[either].mean())
-        apart = np.abs(m - m0)
+        difference = np.abs(m - m0)
         return Turn(
             degrees,
             float(np.abs(h - h0).mean() / spread),
-            float(apart.mean()),
-            float(apart.max()),
+            float(difference.mean()),
+            float(difference.max()),
             otherwise,
         )
 
     half = scene.grid.voxel_size / 2 * np.array([1.0, 1.0, 0.0])
-    shifted = against(scene.xyz + half, None)
-    return shifted, tuple(against(scene.turned(angle), float(angle)) for angle in angles)
+    shifted = compare(scene.xyz + half, None)
+    return shifted, tuple(compare(scene.turned(angle), float(angle)) for angle in angles)
 
 
 def kernel_turn_error(kernel: Tensor) -> float:
-    """max |k - k turned| / max |k|; 1 where the box itself cannot be turned about the anchor."""
+    """max |k - k after a quarter turn| / max |k|; 1 if the box has no such symmetry."""
     _, ky, kx = kernel.shape
     if ky != kx or ky % 2 == 0:
         return 1.0
@@ -148,8 +163,8 @@ def kernel_turn_error(kernel: Tensor) -> float:
     return float((kernel - torch.rot90(kernel, 1, (1, 2))).abs().max()) / largest
 
 
-def answer_of(kernel: Tensor, dense: Tensor) -> Tensor:
-    """H (D, H, W) of a scene given as a volume (D, H, W)."""
+def response(kernel: Tensor, dense: Tensor) -> Tensor:
+    """The response (D, H, W) of ``kernel`` to a scene given as a volume (D, H, W)."""
     depth, height, width = dense.shape
     flat = dense.reshape(-1).numpy()
     occupied = np.flatnonzero(flat)

@@ -13,7 +13,7 @@ from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import ModelCard
 
 NEGLIGIBLE = 0.01
-"""A GENEO with a smaller absolute share is not worth a sentence."""
+"""Absolute share of a GENEO below which the explanation does not state its side."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class TowerExplanation:
         x, y: m, in the CRS of the survey.
         height: m above the ground at its foot.
         probability: highest probability of its voxels.
-        evidence: measurements at the place that support a tower, whatever the model predicts.
+        evidence: measurements at its position, independent of the model.
         contributions: (GENEO, share, sentence), the largest first. Positive shares support a
             tower, negative ones oppose it; their absolute values sum to about one.
         doubts: reasons for a person to check the tower.
@@ -105,7 +105,7 @@ def _sentence(share: float) -> str:
 def meanings(model: VoxelModel, card: ModelCard) -> list[tuple[str, float, str, str]]:
     """Every number of a SCENE-Net as (name, value, unit, meaning); none for a CNN.
 
-    Lengths are in metres too, at the voxel size that surveys are predicted at.
+    The unit of a length in voxels includes the length of a voxel in metres.
     """
     if not isinstance(model, GeneoModel):
         return []
@@ -119,7 +119,7 @@ def meanings(model: VoxelModel, card: ModelCard) -> list[tuple[str, float, str, 
                 unit = f"voxel = {value * card.voxel_size:.2f} m"
             rows.append((f"{name} {parameter.name}", value, unit, parameter.meaning))
     rows += [
-        (f"lambda {name}", values[f"lambda.{name}"], "1", f"weight of the {name} in the answer")
+        (f"lambda {name}", values[f"lambda.{name}"], "1", f"weight of the {name} in the observer")
         for name in model.names
     ]
     return rows

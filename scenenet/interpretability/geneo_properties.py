@@ -1,35 +1,34 @@
-"""What a given model keeps of the promises of a GENEO (thesis 3.4, 4.3 to 4.5), by number.
+"""Which GENEO properties a given model has (thesis 3.4, 4.3 to 4.5), calculated and measured.
 
 A GENEO is equivariant (Eq. 3.1) and non-expansive (Eq. 3.2), and a convex combination of GENEOs is
-one. These are statements about functions on R^3 and normalised kernels; a model works with kernels
-cut to a box of voxels and not normalised. So each is worked out and measured here.
+a GENEO. The thesis states this for functions on R^3 and normalised kernels. A model uses kernels
+that are cut to a box of voxels and not normalised, so each property is verified here.
 
-**Translation** by whole voxels: exact, also at the border, because beyond the grid there is
-nothing. By parts of a voxel it is not: the points fall into other voxels.
+**Translation** by whole voxels: exact, also at the border, because everything outside the grid is
+empty. Translation by part of a voxel is not exact, because points change voxels.
 
-**Quarter turns about z**: exact where the kernel, centred on its anchor, is its own turned image;
-that takes ky = kx and an odd size. A free kernel (the CNN) is not.
+**Quarter turns about z**: exact if a quarter turn about the anchor leaves the kernel unchanged,
+which needs ky = kx and an odd size. A free kernel (the CNN) does not have this symmetry.
 
-**Other angles about z**: not exact. The points fall into other voxels, and the kernel's box has
-corners. The first part is also there when nothing but half a voxel's shift is done, so that is
-measured beside it.
+**Other angles about z**: not exact, because points change voxels and the kernel's box has corners.
+A shift by half a voxel also makes points change voxels, so its effect is measured for comparison.
 
-**Non-expansivity**, in the sup norm. For H = k * phi the least constant is ||k||_1, the sum of
-|k|: phi_1 and phi_2 that differ by one with the sign of k reach it. A kernel that sums to zero is
-no exception: its answers reach half of ||k||_1 on both sides of zero, and from one end to the other
-is all of it. With hundreds of elements ||k||_1 is far above 1, so H as it stands is **not**
-non-expansive, and neither are its kernels g_i. What holds:
+**Non-expansivity**, in the sup norm. The smallest constant of H = k * phi is ||k||_1, the sum of
+|k|; two measurements that differ by one with the sign of k attain it. This also holds for a kernel
+that sums to zero: its responses range from -||k||_1 / 2 to ||k||_1 / 2. With hundreds of elements
+||k||_1 is far above 1, so neither H itself nor its kernels g_i are non-expansive. What holds:
 
-- H / ||k||_1 is non-expansive, and deciding at tau is deciding H / ||k||_1 at
-  artanh(tau) / ||k||_1: the decisions are those of a non-expansive operator.
-- tanh and ReLU do not add to the constant, and near H = 0 they do not lower it: for phi in [0, 1]
-  (density) that of M = (tanh H)_+ is ||k||_1 too. For phi in {0, 1} (presence) two measurements are
-  0 or 1 apart and M lies in [0, 1], so (3.2) holds for M; it would for any kernel.
-- One voxel more or less moves H by one element of k at each place, so by max |k| at most.
+- H / ||k||_1 is non-expansive, and M >= tau is the same as H / ||k||_1 >= artanh(tau) / ||k||_1:
+  the decisions are those of a non-expansive operator.
+- tanh and ReLU do not increase the constant, and near H = 0 they do not lower it: for phi in [0, 1]
+  (density) the constant of M = (tanh H)_+ is ||k||_1 too. For phi in {0, 1} (presence) two
+  measurements differ by 0 or 1 and M lies in [0, 1], so (3.2) holds for M with any kernel.
+- One voxel more or less changes H at each position by one element of k, at most by max |k|.
 
-**Convexity**: the mixing weights sum to one and none is negative, or this one is. In terms of
-normalised kernels g_i / ||g_i||_1 the weights are lambda_i ||g_i||_1 / sum_j lambda_j ||g_j||_1, as
-convex as the lambda_i are: H is a convex combination of GENEOs times a positive number.
+**Convexity**: the mixing weights sum to one and none is negative; otherwise the model is not
+convex. For normalised kernels g_i / ||g_i||_1 the weights are
+lambda_i ||g_i||_1 / sum_j lambda_j ||g_j||_1, which are convex if the lambda_i are: H is a convex
+combination of GENEOs times a positive number.
 """
 
 from __future__ import annotations
@@ -59,16 +58,17 @@ if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
 
 ANGLES_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0)
-"""Turns about z that are measured, degrees."""
+"""Measured rotations about z, degrees."""
 ROUNDING = 1e-4
-"""Share of max |H| that may be rounding: sums of hundreds of float32 terms in another order."""
+"""Largest error, as a share of max |H|, that counts as rounding: sums of hundreds of float32 terms
+in another order."""
 CONVEX_ROUNDING = 1e-5
-"""What mixing weights in float32 may miss their bounds by."""
+"""Largest rounding error of mixing weights in float32."""
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """One kernel in numbers.
+    """The properties of one kernel g.
 
     Attributes:
         name: of the GENEO.
@@ -77,7 +77,7 @@ class Kernel:
         largest: max |g|.
         total: sum of g.
         slice_sum: the largest |sum| of a horizontal slice.
-        sums_to_zero: whether each slice is meant to sum to zero (thesis 4.4.1, 4.4.2).
+        sums_to_zero: whether each slice sums to zero by design (thesis 4.4.1, 4.4.2).
         share: its weight among normalised kernels, lambda ||g||_1 over the sum of these.
     """
 
@@ -93,25 +93,26 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What was found for one model; see the head of ``scenenet.interpretability.geneo_properties``.
+    """The properties of one model; see the docstring of this module.
 
     Attributes:
         kind: architecture.
         measurement: phi of its input.
         kernels: of a SCENE-Net; empty for a model without GENEOs.
-        translation_error: the largest |difference| of H under ``SHIFT``, as a share of max |H|.
+        translation_error: largest |difference| of H under ``SHIFT``, as a share of max |H|.
         quarter_turn_error: the same for the worst of three quarter turns.
-        kernel_turn_error: max |k - k turned by a quarter| as a share of max |k|: the reason.
-        half_voxel: the scene shifted by half a voxel along x and y.
-        turns: the scene turned about z.
-        l1: ||k||_1 of the summed kernel: the least constant of H in the sup norm.
+        kernel_turn_error: max |k - k after a quarter turn| as a share of max |k|, the cause of
+            ``quarter_turn_error``.
+        half_voxel: differences after a shift by half a voxel along x and y.
+        turns: differences after rotations about z.
+        l1: ||k||_1 of the summed kernel, the smallest constant of H in the sup norm.
         l1_bound: sum of |lambda_i| ||g_i||_1, which l1 never exceeds; l1 itself without GENEOs.
-        measured: |H_1 - H_2| / |phi_1 - phi_2| of the worst pair there is, in the convolution.
-        measured_random: the largest between random measurements of {0, 1}.
-        measured_model: that of M, for the worst pair of measurements a thousandth apart or less.
-        answer_low, answer_high: the least and the highest H there can be for phi in [0, 1].
-        one_voxel: max |k|, what one voxel more or less moves H by.
-        tau: threshold; None if there is none.
+        measured: |H_1 - H_2| / |phi_1 - phi_2| of the worst pair, measured with the convolution.
+        measured_random: the largest such value between random measurements in {0, 1}.
+        measured_model: the same for M, for the worst pair with a difference of at most 0.001.
+        lowest_h, highest_h: smallest and largest possible H for phi in [0, 1].
+        one_voxel: max |k|, the largest change of H by a single voxel.
+        tau: threshold; None before tuning.
         normalised_tau: artanh(tau) / ||k||_1, the same threshold for H / ||k||_1.
         weight_sum: sum of the mixing weights; None without GENEOs.
         negative: names of the GENEOs with a negative weight.
@@ -130,8 +131,8 @@ class Certificate:
     measured: float
     measured_random: float
     measured_model: float
-    answer_low: float
-    answer_high: float
+    lowest_h: float
+    highest_h: float
     one_voxel: float
     tau: float | None
     normalised_tau: float | None
@@ -140,26 +141,28 @@ class Certificate:
 
     @property
     def translates(self) -> bool:
+        """Whether H is equivariant under translation by whole voxels."""
         return self.translation_error <= ROUNDING
 
     @property
     def turns_by_quarters(self) -> bool:
+        """Whether H is equivariant under quarter turns about z."""
         return self.quarter_turn_error <= ROUNDING
 
     @property
     def non_expansive(self) -> bool:
-        """Whether H is, as it stands."""
+        """Whether H itself is non-expansive."""
         return self.l1 <= 1 + ROUNDING
 
     @property
     def convex(self) -> bool:
-        """False too for a model without mixing weights."""
+        """Whether the mixing weights are convex; False for a model without mixing weights."""
         if self.weight_sum is None:
             return False
         return not self.negative and abs(self.weight_sum - 1) <= CONVEX_ROUNDING
 
     def statements(self) -> list[Statement]:
-        """What holds and what does not, to be read by a person."""
+        """Which properties hold and which do not, in words."""
         statements = [
             self._translation(),
             self._quarter_turns(),
@@ -168,7 +171,7 @@ class Certificate:
             self._expansion_of_decisions(),
             self._expansion_of_model(),
         ]
-        # A model without GENEOs has no kernels to say anything of.
+        # The last two properties are about GENEOs.
         return [*statements, self._zero_sum(), self._convexity()] if self.kernels else statements
 
     def _translation(self) -> Statement:
@@ -176,7 +179,7 @@ class Certificate:
             "equivariant under translation by whole voxels",
             "4.1, Eq. 3.1",
             self.translates,
-            f"largest difference of H {self.translation_error:.1e} of its largest value",
+            f"H differs by at most {self.translation_error:.1e} of its largest value",
         )
 
     def _quarter_turns(self) -> Statement:
@@ -184,41 +187,41 @@ class Certificate:
             "equivariant under quarter turns about z",
             "4.4.1, Eq. 3.1",
             self.turns_by_quarters,
-            f"largest difference of H {self.quarter_turn_error:.1e} of its largest value; the "
-            f"kernel and its turned image differ by {self.kernel_turn_error:.1e} of its largest "
-            "element",
+            f"H differs by at most {self.quarter_turn_error:.1e} of its largest value; the kernel "
+            f"differs from its turned image by {self.kernel_turn_error:.1e} of its largest element",
         )
 
     def _any_turn(self) -> Statement:
         between = [t for t in self.turns if t.degrees is not None and t.degrees % 90]
         worst = max(between, key=lambda t: t.mean_h, default=None)
         text = "not measured" if worst is None else (
-            f"at {worst.degrees:g} degrees, the worst, H differs by {worst.mean_h:.2f} of its "
-            f"standard deviation and M by {worst.mean_m:.3f} on average; a shift by half a voxel, "
-            f"which no kernel can do anything about, by {self.half_voxel.mean_h:.2f} and "
-            f"{self.half_voxel.mean_m:.3f}"
+            f"at the worst angle, {worst.degrees:g} degrees, H differs on average by "
+            f"{worst.mean_h:.2f} of its standard deviation and M by {worst.mean_m:.3f}; after a "
+            f"shift by half a voxel, which no kernel can compensate, by "
+            f"{self.half_voxel.mean_h:.2f} and {self.half_voxel.mean_m:.3f}"
         )  # fmt: skip
         return Statement("equivariant under any rotation about z", "4.4.1, Eq. 3.1", False, text)
 
     def _expansion(self) -> Statement:
         return Statement(
-            "the observer H is non-expansive as it stands",
+            "the observer H is non-expansive without scaling",
             "Eq. 3.2, 4.3",
             self.non_expansive,
-            f"its constant is ||k||_1 = {self.l1:.3g}, at most {self.l1_bound:.3g} from the "
-            f"kernels' own; {self.measured:.3g} was measured, and {self.measured_random:.3g} "
-            f"between random scenes; one voxel moves it by at most {self.one_voxel:.3g}",
+            f"its constant is ||k||_1 = {self.l1:.3g}, with the bound {self.l1_bound:.3g} from the "
+            f"constants of the kernels; measured: {self.measured:.3g}, and "
+            f"{self.measured_random:.3g} between random scenes; one voxel changes H by at most "
+            f"{self.one_voxel:.3g}",
         )
 
     def _expansion_of_decisions(self) -> Statement:
         at = "" if self.normalised_tau is None else (
-            f"; tau = {self.tau:.4g} is {self.normalised_tau:.4g} there"
+            f"; for tau = {self.tau:.4g} that is {self.normalised_tau:.4g}"
         )  # fmt: skip
         return Statement(
             "decisions are those of a non-expansive operator",
             "Eq. 3.2, 4.3",
             self.l1 > 0,
-            f"H / ||k||_1 has the constant 1 and is decided at artanh(tau) / ||k||_1{at}",
+            f"H / ||k||_1 has the constant 1 and the threshold artanh(tau) / ||k||_1{at}",
         )
 
     def _expansion_of_model(self) -> Statement:
@@ -227,14 +230,15 @@ class Certificate:
                 "the model M is non-expansive",
                 "Eq. 3.2, 4.3",
                 True,
-                "different measurements are 1 apart and M lies in [0, 1], so that it would be with "
-                f"any kernel; for values between, its constant is that of H, {self.l1:.3g}",
+                "different measurements differ by 1 and M lies in [0, 1], so this holds with any "
+                f"kernel; for measurements between 0 and 1 the constant would be that of H, "
+                f"{self.l1:.3g}",
             )
         return Statement(
             "the model M is non-expansive",
             "Eq. 3.2, 4.3",
             self.non_expansive,
-            f"its constant is that of H, {self.l1:.3g}; {self.measured_model:.3g} was measured",
+            f"its constant is that of H, {self.l1:.3g}; measured: {self.measured_model:.3g}",
         )
 
     def _zero_sum(self) -> Statement:
@@ -244,9 +248,9 @@ class Certificate:
             "zero-sum kernels sum to zero",
             "4.4.1, 4.4.2",
             all(k.name in balanced for k in self.kernels if k.sums_to_zero),
-            f"sum to zero in every slice: {', '.join(balanced) or 'none'}; sums of the others: "
-            f"{', '.join(others) or 'none'}; H lies in [{self.answer_low:.3g}, "
-            f"{self.answer_high:.3g}] and not in [0, 1]",
+            f"kernels that sum to zero in every slice: {', '.join(balanced) or 'none'}; sums of "
+            f"the others: {', '.join(others) or 'none'}; H lies in [{self.lowest_h:.3g}, "
+            f"{self.highest_h:.3g}] and not in [0, 1]",
         )
 
     def _convexity(self) -> Statement:
@@ -257,7 +261,7 @@ class Certificate:
             "convex combination of GENEOs",
             "Eq. 4.1, 4.5",
             self.convex,
-            f"weights {weights}, together {self.weight_sum:.6f}{wrong}; among normalised kernels "
+            f"weights {weights}; sum {self.weight_sum:.6f}{wrong}; weights of normalised kernels "
             f"{shares}",
         )
 
@@ -272,15 +276,15 @@ def certify(
     angles: Sequence[float] = ANGLES_DEG,
     seed: int = 0,
 ) -> Certificate:
-    """Measure and work out what a model keeps of the promises of a GENEO.
+    """Verify which GENEO properties a model has.
 
     Args:
-        points: (N, 3) xyz, m, of a scene to measure on; a small synthetic one if None.
-        voxel_size: m, of the grid that the scene is laid on.
+        points: (N, 3) xyz, m, of the scene to measure with; a small synthetic one if None.
+        voxel_size: m, of the grid of the scene.
         measurement: phi of the model's input.
         tau: the model's threshold, to count decisions that change.
         angles: degrees about z.
-        seed: of the random measurements; ``measured_random`` alone depends on it.
+        seed: of the random measurements; only ``measured_random`` depends on it.
 
     Raises:
         InputError: there are no points, or they are too far apart for the voxel size.
@@ -309,8 +313,8 @@ def certify(
             measured=worst_pair(k),
             measured_random=random_pairs(k, seed),
             measured_model=worst_pair_of_model(k, offset),
-            answer_low=float(k.clamp(max=0).sum()) + offset,
-            answer_high=float(k.clamp(min=0).sum()) + offset,
+            lowest_h=float(k.clamp(max=0).sum()) + offset,
+            highest_h=float(k.clamp(min=0).sum()) + offset,
             one_voxel=float(k.abs().max()),
             tau=tau,
             normalised_tau=None if tau is None or l1 == 0 else _observed(tau) / l1,
@@ -320,7 +324,7 @@ def certify(
 
 
 def _mixing(model: VoxelModel) -> tuple[tuple[Kernel, ...], float | None, tuple[str, ...]]:
-    """The kernels in numbers, the sum of the mixing weights, and who has a negative one."""
+    """The kernels, the sum of the mixing weights, and the names of the negative ones."""
     if not isinstance(model, GeneoModel):
         return (), None, ()
     weights = model.mixing_weights().detach().double().tolist()
@@ -347,5 +351,5 @@ def _mixing(model: VoxelModel) -> tuple[tuple[Kernel, ...], float | None, tuple[
 
 
 def _observed(tau: float) -> float:
-    """What the observer answers where the model's probability is tau."""
+    """The observer's H at which the model's probability is tau."""
     return math.atanh(min(tau, 1 - 1e-16))

@@ -1,7 +1,7 @@
-"""A SCENE-Net's numbers in metres, each read out in a sentence (thesis 5.2.2, Figure 5.5).
+"""The numbers of a SCENE-Net in metres, each with a sentence (thesis 5.2.2, Figure 5.5).
 
-The sentences follow from the formulas of the kernels (thesis 4.4) and from nothing else. A kernel
-that has none here is read by the meaning that stands beside each of its parameters.
+The sentences follow from the formulas of the kernels alone (thesis 4.4). A parameter without a
+sentence is described by its ``meaning``.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from scenenet.geneo import ShapeParameter
-    from scenenet.geneo.sentences import Numbers, Surroundings
+    from scenenet.geneo.sentences import Numbers, Reference
     from scenenet.models.geneo_model import GeneoModel
 
 
@@ -19,10 +19,10 @@ class Parameter(NamedTuple):
     """One number of a SCENE-Net.
 
     Attributes:
-        name: as in histories, such as ``cylinder.r`` or ``lambda.arrow``.
-        symbol: as the thesis writes it.
+        name: its name in histories, such as ``cylinder.r`` or ``lambda.arrow``.
+        symbol: its symbol in the thesis.
         unit: ``m``, ``m^2`` or ``1``.
-        factor: what a value is multiplied by that is in voxels.
+        factor: converts the model's value into ``unit``.
     """
 
     name: str
@@ -37,7 +37,7 @@ def parameters_of(model: GeneoModel, voxel_size: float) -> list[Parameter]:
     Args:
         voxel_size: m, edge of the voxels that kernels in voxels were trained on.
     """
-    # Here, because who only wants to know which tables there are need not wait for torch.
+    # Imported here because the names of tables must be available without loading torch.
     from scenenet.geneo import kernel_named
 
     metres = model.length_unit_m(voxel_size)
@@ -51,19 +51,19 @@ def parameters_of(model: GeneoModel, voxel_size: float) -> list[Parameter]:
 
 
 def sentences(
-    model: GeneoModel, values: Mapping[str, float], beside: Surroundings | None = None
+    model: GeneoModel, values: Mapping[str, float], reference: Reference | None = None
 ) -> dict[str, str]:
-    """What each number says.
+    """A sentence for each number, by name.
 
     Args:
         values: of ``parameters_of``, by name, in metres.
-        beside: what lengths are put beside.
+        reference: lengths to compare with.
     """
-    # Here, because who only wants to know which tables there are need not wait for torch.
+    # Imported here because the names of tables must be available without loading torch.
     from scenenet.geneo import kernel_named
-    from scenenet.geneo.sentences import ALONE
+    from scenenet.geneo.sentences import Reference
 
-    said = {}
+    texts = {}
     for name, geneo in zip(model.names, model.geneos, strict=True):
         kernel = kernel_named(geneo)
         numbers = {p.name: values[f"{name}.{p.name}"] for p in kernel.parameters}
@@ -71,10 +71,10 @@ def sentences(
             if parameter.sentence is None:
                 text = _plain(parameter, numbers[parameter.name])
             else:
-                text = parameter.sentence(numbers, beside or ALONE)
-            said[f"{name}.{parameter.name}"] = text
+                text = parameter.sentence(numbers, reference or Reference())
+            texts[f"{name}.{parameter.name}"] = text
     weights = {name: values[f"lambda.{name}"] for name in model.names}
-    return said | {f"lambda.{name}": _weight(name, weights) for name in weights}
+    return texts | {f"lambda.{name}": _weight(name, weights) for name in weights}
 
 
 def _plain(parameter: ShapeParameter, value: float) -> str:
@@ -86,6 +86,7 @@ def _weight(name: str, weights: Numbers) -> str:
     order = sorted(weights, key=lambda one: -weights[one])
     place = order.index(name)
     if weights[name] < 0:
-        return "negative, so its kernel is turned into its opposite and the mixture is not convex"
-    said = {0: "the most", len(order) - 1: "the least"}.get(place, f"number {place + 1}")
-    return f"{weights[name]:.1%} of the mixture, {said} of the {len(order)} operators"
+        return "negative: the kernel counts with the opposite sign, and the mixture is not convex"
+    ranks = {0: "the largest weight", len(order) - 1: "the smallest weight"}
+    rank = ranks.get(place, f"weight number {place + 1}")
+    return f"{weights[name]:.1%} of the mixture, {rank} of the {len(order)} kernels"

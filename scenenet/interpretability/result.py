@@ -19,7 +19,7 @@ class Turn:
         mean_h: mean |difference| of H, as a share of the standard deviation of H.
         mean_m: mean |difference| of M, in [0, 1].
         largest_m: the largest |difference| of M.
-        decided_otherwise: of the points at or above tau before or after, the share that is so only
+        decision_changed: of the points at or above tau before or after, the share that is so only
             once; None without tau, or without such points.
     """
 
@@ -27,7 +27,7 @@ class Turn:
     mean_h: float
     mean_m: float
     largest_m: float
-    decided_otherwise: float | None
+    decision_changed: float | None
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,7 @@ def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
     of the initial values over the seeds, ``initial_from`` says how they are known
     (``scenenet.results.initial_models``).
     """
-    from scenenet.geneo.sentences import Surroundings
+    from scenenet.geneo.sentences import Reference
 
     columns = ["model", "parameter", "symbol", "unit", "mean", "std", "n_seeds", "initial",
                "initial_from", "thesis", "sentence"]  # fmt: skip
@@ -79,8 +79,8 @@ def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
         if found is None:
             continue
         means = found.after.mean()
-        surroundings = Surroundings(found.step, _tower_width(results))
-        texts = sentences(found.network, means.to_dict(), surroundings)
+        reference = Reference(found.step, _tower_width(results))
+        texts = sentences(found.network, means.to_dict(), reference)
         for parameter in found.parameters:
             name = parameter.name
             rows.append(
@@ -180,7 +180,7 @@ def certificate(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
 def turns(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
     """Change of the output of each model when the scene is rotated about z, or shifted by half a
     voxel (``degrees`` empty); one row per rotation."""
-    columns = ["model", "degrees", "mean_h", "mean_m", "largest_m", "decided_otherwise"]
+    columns = ["model", "degrees", "mean_h", "mean_m", "largest_m", "decision_changed"]
     rows = []
     for model in results.models:
         known = results.certificate(model)

@@ -54,7 +54,7 @@ def test_each_statement_has_the_number_that_goes_with_it(field):
     assert len(values) == 8
     assert values["equivariant under translation by whole voxels"] == numbers["translation_error"]
     assert values["equivariant under quarter turns about z"] == numbers["quarter_turn_error"]
-    assert values["the observer H is non-expansive as it stands"] == numbers["l1"]
+    assert values["the observer H is non-expansive without scaling"] == numbers["l1"]
     assert values["convex combination of GENEOs"] == numbers["weight_sum"]
     turned = [turn.mean_h for turn in field.turns if turn.degrees % 90]
     assert values["equivariant under any rotation about z"] == max(turned)

@@ -73,10 +73,10 @@ def test_no_other_turn_is_exact_and_a_shift_by_half_a_voxel_is_not_either():
     for exact in (0.0, 90.0):
         assert by_angle[exact].mean_h < 1e-5
         assert by_angle[exact].largest_m < 1e-4
-        assert by_angle[exact].decided_otherwise == pytest.approx(0, abs=1e-3)
+        assert by_angle[exact].decision_changed == pytest.approx(0, abs=1e-3)
     for angle in (15.0, 30.0, 45.0, 60.0, 75.0):
         assert 0.01 < by_angle[angle].mean_h < 1
-        assert by_angle[angle].decided_otherwise > 0
+        assert by_angle[angle].decision_changed > 0
     assert found.half_voxel.degrees is None
     assert found.half_voxel.mean_h > 0.01
     assert not holds(found, "any rotation")
@@ -120,15 +120,15 @@ def test_the_bound_is_reached_and_never_passed(size, seed):
     assert 0 < found.measured_random < found.l1
     assert found.l1 <= found.l1_bound * (1 + 1e-6)
     assert found.one_voxel < found.l1
-    assert found.answer_high - found.answer_low == pytest.approx(found.l1)
+    assert found.highest_h - found.lowest_h == pytest.approx(found.l1)
 
 
 def test_a_zero_sum_kernel_is_no_contraction_and_the_normalised_observer_is():
     weights = {"cylinder": 1.0, "arrow": 0.0, "negative_sphere": 0.0}
     model = scenenet(weights=weights)
     found = certify(model, tau=0.9)
-    assert found.answer_high == pytest.approx(found.l1 / 2, rel=1e-4)  # zero sum
-    assert found.answer_low == pytest.approx(-found.l1 / 2, rel=1e-4)
+    assert found.highest_h == pytest.approx(found.l1 / 2, rel=1e-4)  # zero sum
+    assert found.lowest_h == pytest.approx(-found.l1 / 2, rel=1e-4)
     assert found.l1 > 1
     assert not found.non_expansive
     assert not holds(found, "observer H")
@@ -162,7 +162,7 @@ def test_the_constant_of_a_model_with_a_bias_is_that_of_its_kernel(bias):
     assert found.measured_model == pytest.approx(found.l1, rel=1e-3)
     with torch.no_grad():
         kernel = model.observer()[0]
-    assert found.answer_high == pytest.approx(float(kernel.clamp(min=0).sum()) + 3 * bias, abs=1e-5)
+    assert found.highest_h == pytest.approx(float(kernel.clamp(min=0).sum()) + 3 * bias, abs=1e-5)
 
 
 def test_mixing_weights_in_bounds_are_convex():

@@ -11,7 +11,7 @@ import pytest
 import torch
 
 from scenenet.geneo import Lattice, kernel_named
-from scenenet.geneo.sentences import Surroundings
+from scenenet.geneo.sentences import Reference
 from scenenet.interpretability.parameter_sentences import parameters_of, sentences
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
@@ -57,7 +57,7 @@ def test_every_number_has_a_sentence_and_it_follows_the_number():
 
 
 def test_the_cylinder_is_as_wide_as_twice_its_radius_and_a_share_of_a_tower():
-    said = sentences(SceneNet(), VALUES, Surroundings(tower_width=3.6))["cylinder.r"]
+    said = sentences(SceneNet(), VALUES, Reference(tower_width=3.6))["cylinder.r"]
     assert lengths(said) == [1.8]
     assert "50% of the mean width" in said
 
@@ -86,15 +86,15 @@ def test_beyond_the_length_that_omega_is_read_as_the_sphere_takes_away():
 def test_weights_say_who_has_the_most():
     said = sentences(SceneNet(), VALUES)
     assert said["lambda.negative_sphere"].startswith("70.0%")
-    assert "the most of the 3" in said["lambda.negative_sphere"]
-    assert "the least" in said["lambda.arrow"]
+    assert "the largest weight of the 3" in said["lambda.negative_sphere"]
+    assert "the smallest weight" in said["lambda.arrow"]
 
 
 def test_a_negative_weight_and_a_sphere_without_omega_are_said_to_be_so():
     odd = VALUES | {"lambda.arrow": -0.2, "negative_sphere.omega": -0.1}
     said = sentences(SceneNet(), odd)
     assert "not convex" in said["lambda.arrow"]
-    assert "nothing is taken off" in said["negative_sphere.omega"]
+    assert "nothing is subtracted" in said["negative_sphere.omega"]
 
 
 def test_repeated_kernels_are_read_by_their_own_numbers():

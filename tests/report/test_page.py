@@ -122,7 +122,7 @@ def test_parameters_have_sentences_and_properties_are_verified(page: Path):
     found = read(page)
     assert {"learned", "certificate"} <= {section["id"] for section in found.all("section")}
     for text in (
-        "speaks most for a tower",
+        "gives the strongest response",
         "76.34 %",
         "scenenet: 6 of 8 properties hold",
         "convex combination of GENEOs",

@@ -1,1 +1,1 @@
-"""One file a kernel. Each file found here is imported by the registry."""
+"""One file for each kernel. The registry imports every file in this package."""

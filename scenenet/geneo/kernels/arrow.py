@@ -1,4 +1,4 @@
-"""A tower's body with a cone on top for the lines that meet there (thesis 4.4.2, Figure 4.3)."""
+"""A tower's body with a cone on top, where the conductors meet (thesis 4.4.2, Figure 4.3)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from scenenet.geneo.kernel import (
-    BASE,
+    BODY_RADIUS,
     GeneoKernel,
     Lattice,
     ShapeParameter,
@@ -17,41 +17,38 @@ from scenenet.geneo.kernel import (
     zero_sum,
 )
 from scenenet.geneo.registry import register
-from scenenet.geneo.sentences import Numbers, Surroundings, body_radius, m, shell
+from scenenet.geneo.sentences import Numbers, Reference, m, shell
 
 CONE_SHARE = 1 / 3
-"""Share of the kernel's height that the cone takes. The height h at which it begins follows from
+"""Share of the kernel's height that the cone takes. The height h of the cone's base follows from
 the kernel's size and is not trained (thesis Figure 5.5), which leaves eleven trained numbers."""
 
 
-def _head_reach(n: Numbers, beside: Surroundings) -> str:
+def _head_reach(n: Numbers, reference: Reference) -> str:
     radius = _head_radius(n)
     share = radius / abs(n["r_c"]) if n["r_c"] else 0.0
-    return (
-        f"the head is looked for {m(radius)} from the axis where it begins, which is {share:.0%} "
-        "of this reach"
-    )
+    return f"the base of the head has a radius of {m(radius)}, which is {share:.0%} of this reach"
 
 
-def _head_sigma(n: Numbers, beside: Surroundings) -> str:
+def _head_sigma(n: Numbers, reference: Reference) -> str:
     body, head = shell(n["r"], n["sigma"])[1], shell(_head_radius(n), n["sigma"])[1]
     return (
-        f"points within {m(body)} of the axis below and {m(head)} where the head begins count at "
-        "least half as much as the best"
+        f"points within {m(body)} of the axis below the head, and within {m(head)} at its base, "
+        "have at least half the highest weight"
     )
 
 
-def _head_slope(n: Numbers, beside: Surroundings) -> str:
+def _head_slope(n: Numbers, reference: Reference) -> str:
     first, second = (math.sqrt(abs(math.sin(n["beta"] * math.pi / t))) for t in (2, 4))
     turn = "narrows" if second < first else "widens"
-    above = m(2 * beside.step)
+    above = m(2 * reference.step)
     if first == 0:
-        return "the head has no width where it begins"
-    return f"{above} above where it begins the head {turn} to {second / first:.0%} of its radius"
+        return "the base of the head has no width"
+    return f"{above} above its base the head {turn} to {second / first:.0%} of its radius there"
 
 
 def _head_radius(n: Numbers) -> float:
-    """Radius of the arrow's head where it begins, r_c sqrt(sin(beta pi / 2)), m."""
+    """Radius of the base of the arrow's head, r_c sqrt(sin(beta pi / 2)), m."""
     return abs(n["r_c"]) * math.sqrt(abs(math.sin(n["beta"] * math.pi / 2)))
 
 
@@ -67,16 +64,7 @@ class Arrow(GeneoKernel):
     name = "arrow"
     sums_to_zero = True
     parameters = (
-        ShapeParameter(
-            "r",
-            0.2,
-            2.0,
-            "voxel",
-            "radius of the tower's body",
-            metric=(0.1, 1.5),
-            by_hand=BASE,
-            sentence=body_radius,
-        ),
+        BODY_RADIUS,
         ShapeParameter(
             "sigma",
             0.5,
@@ -91,7 +79,7 @@ class Arrow(GeneoKernel):
             0.5,
             3.0,
             "voxel",
-            "reach of the tower's head, where the lines meet",
+            "reach of the tower's head, where the conductors meet",
             metric=(0.3, 1.5),
             sentence=_head_reach,
         ),

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from torch import Tensor
 
 from scenenet.geneo.kernel import (
-    BASE,
+    BODY_RADIUS,
     GeneoKernel,
     Lattice,
     ShapeParameter,
@@ -15,13 +15,11 @@ from scenenet.geneo.kernel import (
     zero_sum,
 )
 from scenenet.geneo.registry import register
-from scenenet.geneo.sentences import Numbers, Surroundings, between, body_radius, shell
+from scenenet.geneo.sentences import Numbers, Reference, shell_width
 
 
-def _body_sigma(n: Numbers, beside: Surroundings) -> str:
-    inner, outer = shell(n["r"], n["sigma"])
-    where = between(inner, outer, "the axis")
-    return f"points {where} count at least half as much as the best, before the mean is taken off"
+def _body_sigma(n: Numbers, reference: Reference) -> str:
+    return shell_width(n, centre="the axis", subtracted="the mean")
 
 
 @register
@@ -31,16 +29,7 @@ class Cylinder(GeneoKernel):
     name = "cylinder"
     sums_to_zero = True
     parameters = (
-        ShapeParameter(
-            "r",
-            0.2,
-            2.0,
-            "voxel",
-            "radius of the tower's body",
-            metric=(0.1, 1.5),
-            by_hand=BASE,
-            sentence=body_radius,
-        ),
+        BODY_RADIUS,
         ShapeParameter(
             "sigma",
             0.5,

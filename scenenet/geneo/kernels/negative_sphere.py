@@ -1,4 +1,4 @@
-"""What is round, as trees and bushes are, speaks against a tower (thesis 4.4.3, Figure 4.4)."""
+"""Round shapes, such as trees and bushes, oppose a tower (thesis 4.4.3, Figure 4.4)."""
 
 from __future__ import annotations
 
@@ -9,28 +9,26 @@ from torch import Tensor
 
 from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, gaussian_shell
 from scenenet.geneo.registry import register
-from scenenet.geneo.sentences import Numbers, Surroundings, between, m, shell
+from scenenet.geneo.sentences import Numbers, Reference, m, shell_width
 
 
-def _crown_radius(n: Numbers, beside: Surroundings) -> str:
-    return f"round shapes {m(2 * abs(n['r']))} across are told apart from all around them"
+def _crown_radius(n: Numbers, reference: Reference) -> str:
+    return f"distinguishes round shapes {m(2 * abs(n['r']))} across from their surroundings"
 
 
-def _crown_sigma(n: Numbers, beside: Surroundings) -> str:
-    inner, outer = shell(n["r"], n["sigma"])
-    where = between(inner, outer, "the voxel")
-    return f"points {where} count at least half as much as the best, before omega is taken off"
+def _crown_sigma(n: Numbers, reference: Reference) -> str:
+    return shell_width(n, centre="the voxel", subtracted="omega")
 
 
-def _crown_omega(n: Numbers, beside: Surroundings) -> str:
+def _crown_omega(n: Numbers, reference: Reference) -> str:
     omega = n["omega"]
     if omega <= 0:
-        return "nothing is taken off: what is round speaks for a tower, and the rest does not count"
+        return "nothing is subtracted: round shapes support a tower, and other points do not count"
     if omega >= 1:
-        return "every occupied voxel in reach speaks against a tower"
+        return "every occupied voxel within the kernel opposes a tower"
     height = abs(n["sigma"]) * math.sqrt(-2 * math.log(omega))
     outer = math.sqrt(n["r"] ** 2 + height)
-    return f"every occupied voxel beyond {m(outer)} takes {omega:.2f} from the answer"
+    return f"each occupied voxel beyond {m(outer)} lowers the response, by up to {omega:.2f}"
 
 
 @register
@@ -44,7 +42,7 @@ class NegativeSphere(GeneoKernel):
             0.5,
             3.0,
             "voxel",
-            "radius of the crowns it weighs",
+            "radius of the tree crowns",
             metric=(0.1, 1.5),
             sentence=_crown_radius,
         ),
@@ -62,7 +60,7 @@ class NegativeSphere(GeneoKernel):
             0.05,
             0.15,
             "1",
-            "weight against full surroundings",
+            "penalty for points all around",
             metric=(0.02, 0.6),
             sentence=_crown_omega,
         ),

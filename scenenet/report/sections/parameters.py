@@ -102,7 +102,7 @@ def certificate(context: ReportContext) -> Section | None:
             Column("mean_h", "mean change of H", "score"),
             Column("mean_m", "mean change of M", "score"),
             Column("largest_m", "largest change of M", "score"),
-            Column("decided_otherwise", "share of detections that differ", "score"),
+            Column("decision_changed", "share of detections that differ", "score"),
         ]
         caption = (
             "Change of the output when the scene is rotated about z or, in the row without an "

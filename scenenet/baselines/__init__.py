@@ -1,1 +1,1 @@
-"""The boosted trees that SCENE-Net is compared with."""
+"""Boosted trees, a baseline for SCENE-Net."""

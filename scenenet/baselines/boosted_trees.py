@@ -1,7 +1,7 @@
-"""The baseline: boosted trees on voxel features.
+"""Boosted trees on voxel features, a baseline.
 
 The thesis only compares with a CNN (5.2.4.2). A strong model without interpretable parts shows
-better how much the data hold and how much of it eleven numbers reach: scikit-learn's
+which scores the data allow, and how close eleven parameters come to them: scikit-learn's
 ``HistGradientBoostingClassifier`` on ``scenenet.baselines.voxel_features``, trained on the same
 crops and scored on the same voxels. It never predicts a tower in an empty voxel.
 
@@ -26,11 +26,12 @@ from scenenet.metrics.threshold_curve import ThresholdCurve
 
 
 class BoostedTreesSettings(Settings):
-    """How the trees are grown.
+    """Hyperparameters of the trees.
 
-    About fifteen settings were tried on real crops. These had the highest F0.5 on training crops
-    left out, or an equal one with less spread over seeds. Fewer features per split, a quarter of
-    the leaves or a lower tower weight are worse; other changes within a factor of two are not.
+    About fifteen combinations were tried on real crops. These had the highest F0.5 on training
+    crops that were left out, or the same F0.5 with a smaller spread over seeds. Fewer features per
+    split, a quarter of the leaves or a lower tower weight are worse; other changes by up to a
+    factor of two are not.
     """
 
     trees: int = Field(200, ge=1, description="number of trees, each correcting the ones before")
@@ -49,12 +50,12 @@ class BoostedTreesSettings(Settings):
 
 
 class Trees(NamedTuple):
-    """Trees as arrays over their nodes, one tree after the other; children come after parents.
+    """Trees as arrays over their nodes, one tree after the other, parents before children.
 
     Attributes:
         root: (T,) int32, first node of each tree.
         feature: (N,) int32, feature that a node splits on; -1 in a leaf.
-        threshold: (N,) float64; a row goes left where the feature is at most this.
+        threshold: (N,) float64; a row goes left if the feature is at most this.
         left, right: (N,) int32, child nodes; 0 in a leaf.
         value: (N,) float64, what a leaf adds to the log odds; 0 in other nodes.
     """
@@ -69,14 +70,14 @@ class Trees(NamedTuple):
 
 @dataclass(frozen=True)
 class BoostedTrees:
-    """Boosted trees.
+    """A trained model of boosted trees.
 
     Attributes:
-        settings, seed: what it was trained with.
+        settings, seed: of the training.
         odds: log odds before the first tree.
         trees: the trees.
         tau: threshold; None before tuning.
-        provenance: what made it.
+        provenance: where it is from.
     """
 
     settings: BoostedTreesSettings
@@ -91,19 +92,17 @@ class BoostedTrees:
         return self.of_features(voxel_features(sample))
 
     def of_features(self, features: np.ndarray) -> np.ndarray:
-        """The same from ``voxel_features`` (M, F)."""
+        """The same, from ``voxel_features`` (M, F)."""
         odds = _add_up(np.ascontiguousarray(features, np.float32), *self.trees) + self.odds
         return (1 / (1 + np.exp(-odds))).astype(np.float32)
 
     def probabilities(self, sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
-        """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid.
-
-        As ``scenenet.models.predictions.probabilities`` has it for the other models.
-        """
+        """Probability (V,) float32 and labels (V,) bool of every voxel of the sample's grid, like
+        ``scenenet.models.predictions.probabilities`` for the other models."""
         return sample.spread(self.of_occupied(sample))
 
     def n_parameters(self) -> int:
-        """Learnt numbers: feature and threshold of each split, the value of each leaf."""
+        """Number of trained numbers: feature and threshold of each split, value of each leaf."""
         leaves = int((self.trees.feature < 0).sum())
         return 2 * (len(self.trees.feature) - leaves) + leaves
 
@@ -111,7 +110,7 @@ class BoostedTrees:
         """tau.
 
         Raises:
-            InputError: it has not been tuned.
+            InputError: the model has not been tuned.
         """
         if self.tau is None:
             raise InputError(
@@ -126,19 +125,19 @@ def fit(
     seed: int,
     provenance: dict[str, Any] | None = None,
 ) -> BoostedTrees:
-    """Grow the trees on the occupied voxels; the same arguments give the same trees.
+    """Train on the occupied voxels; the same arguments give the same trees.
 
-    The seed draws the features that each split may choose from.
+    The seed determines the features that each split may choose from.
 
     Raises:
-        InputError: there is no tower voxel, or nothing else, to learn from.
+        InputError: the crops have no tower voxel, or no other one.
     """
     features = [voxel_features(sample) for sample in training]
     return _fit(features, [sample.tower for sample in training], settings, seed, provenance)
 
 
 def threshold_curve(model: BoostedTrees, samples: Sequence[VoxelSample]) -> ThresholdCurve:
-    """Scores at every tau over all voxels of ``samples``, empty ones included."""
+    """Scores at every threshold over all voxels of ``samples``, empty ones included."""
     total = ThresholdCurve.empty()
     for sample in samples:
         total += ThresholdCurve.of(*model.probabilities(sample))
@@ -146,7 +145,7 @@ def threshold_curve(model: BoostedTrees, samples: Sequence[VoxelSample]) -> Thre
 
 
 def tune(model: BoostedTrees, validation: Sequence[VoxelSample]) -> BoostedTrees:
-    """The model with the tau that has the highest F0.5 on ``validation``."""
+    """The model with the tau of the highest F0.5 on ``validation``."""
     return replace(model, tau=threshold_curve(model, validation).best()[0])
 
 
@@ -156,13 +155,13 @@ def fit_and_tune(
     seed: int,
     provenance: dict[str, Any] | None = None,
 ) -> tuple[BoostedTrees, ThresholdCurve]:
-    """Train on all crops and tune by leave-one-out over them, where none can be spared.
+    """Train on all crops and tune by leave-one-out, for data without validation crops.
 
-    Trees memorise the voxels that they grew on, so tau must not be chosen there: each crop is
-    predicted by trees grown on the others.
+    Trees memorise their training voxels, so tau must not be chosen on these: each crop is predicted
+    by trees that were trained on the others.
 
     Returns:
-        the tuned model, and the curve that tau was chosen on.
+        the tuned model, and the curve from which tau was chosen.
 
     Raises:
         InputError: there are fewer than two crops, or one holds all tower voxels.
@@ -193,10 +192,10 @@ def _fit(
     tower = np.concatenate([*towers, np.empty(0, bool)])
     n_tower = int(tower.sum())
     if n_tower == 0 or n_tower == len(tower):
-        what = "other than tower voxels" if n_tower else "of a tower voxel"
+        what = "only tower voxels" if n_tower else "no tower voxel"
         raise InputError(
-            f"nothing {what} in the {len(towers)} training crops",
-            remedy="Add labelled crops, and check that their class scheme is the right one",
+            f"the {len(towers)} training crops have {what}",
+            remedy="Add labelled crops, and check their class scheme",
         )
     from sklearn.ensemble import HistGradientBoostingClassifier
 
@@ -207,7 +206,7 @@ def _fit(
         min_samples_leaf=settings.leaf_voxels,
         l2_regularization=settings.l2,
         max_features=settings.feature_share,
-        early_stopping=False,  # it would hold out neighbours of the voxels that it trains on
+        early_stopping=False,  # it would validate on neighbours of training voxels
         random_state=seed,
     )
     each = settings.tower_weight * (len(tower) - n_tower) / n_tower
@@ -219,7 +218,7 @@ def _fit(
 def _trees_of(grown: Any) -> Trees:
     """The trees of a fitted classifier.
 
-    scikit-learn has no public access to them; the tests compare every probability with its own.
+    scikit-learn has no public access to them; a test compares the probabilities with its own.
     """
     nodes = [predictor.nodes for (predictor,) in grown._predictors]
     root = np.cumsum([0, *(len(tree) for tree in nodes)])[:-1].astype(np.int32)
@@ -238,7 +237,7 @@ def _trees_of(grown: Any) -> Trees:
 
 @numba.njit(cache=True)
 def _add_up(features, root, feature, threshold, left, right, value):  # pragma: no cover - compiled
-    """(M,) float64, the sum of the leaves that each row of ``features`` falls into."""
+    """(M,) float64, for each row of ``features`` the sum of its leaves over all trees."""
     out = np.zeros(len(features))
     for i in range(len(features)):
         for tree in range(len(root)):

@@ -1,4 +1,4 @@
-"""Training, tuning and scoring of the boosted trees from several seeds."""
+"""Training, tuning and scoring of the boosted trees with several seeds."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def evaluate_boosted_trees(
     outs: Sequence[str | Path],
     out_times: str | Path,
 ) -> None:
-    """Train the boosted trees from each seed, tune it on validation and score it on the test crops.
+    """Train boosted trees with each seed, tune them on validation and score them on test crops.
 
     Args:
-        outs: JSON file of each seed: what ``score_predictions`` returns, and ``parameters``.
-        out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels an edge
-            (``scenenet.evaluation.inference_time``), ``peak_memory_mb`` of all of this.
+        outs: JSON file of each seed: the result of ``score_predictions``, with ``parameters``.
+        out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels per edge
+            (``scenenet.evaluation.inference_time``), and ``peak_memory_mb`` of the whole call.
     """
     from scenenet.baselines import boosted_trees
     from scenenet.core.files import write_json
@@ -39,7 +39,7 @@ def evaluate_boosted_trees(
         for part in ("train", "validation", "test")
     }
     seconds: list[float] = []
-    took: dict[str, float] = {}
+    inference_ms: dict[str, float] = {}
     for seed, out in zip(seeds, outs, strict=True):
         begin = time.perf_counter()
         grown = boosted_trees.fit(
@@ -53,8 +53,8 @@ def evaluate_boosted_trees(
         )
         scores = replace(scores, part="test", parameters=model.n_parameters())
         write_json(out, scores.to_json())
-        if not took:
+        if not inference_ms:
             timed = sorted(parts["test"].samples, key=lambda sample: sample.id)[:CROPS]
             edge = str(max(timed[0].grid.shape))
-            took = {edge: milliseconds(model.probabilities, timed)}
-    write_json(out_times, {"training_seconds": seconds, "inference_ms": took} | used())
+            inference_ms = {edge: milliseconds(model.probabilities, timed)}
+    write_json(out_times, {"training_seconds": seconds, "inference_ms": inference_ms} | used())

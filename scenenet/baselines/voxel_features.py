@@ -1,14 +1,13 @@
-"""Features of a voxel's surroundings for the boosted trees.
+"""Features of the surroundings of a voxel, for the boosted trees.
 
-A SCENE-Net sees a voxel through one kernel. A model that is to be a fair measure for it (thesis
-5.2.4.2) gets what is known to help with towers, worked out beforehand: how high above the ground a
-voxel lies, how far what it belongs to goes on upwards, what else stands around, how its
-neighbourhood is shaped and whether wires are near. Everything comes from where points are and how
-many; labels are never looked at, and neither is the place in the crop, because crops are cut about
-towers.
+A SCENE-Net observes a voxel through one kernel. A strong baseline (thesis 5.2.4.2) gets features
+that are known to identify towers: the height of a voxel above the ground, how far the structure
+around it continues upwards, the heights around it, the shape of its neighbourhood and the distance
+to conductors. All of them follow from the positions and numbers of points. None uses labels or the
+position in the crop, because towers are in the middle of crops.
 
-Windows are in metres, so a grid of half the voxel size gives about the same numbers. A window
-smaller than a voxel is that voxel.
+Windows are in metres, so a grid with half the voxel size gives about the same numbers. A window
+smaller than a voxel is a single voxel.
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ from scenenet.dataset.voxels import VoxelSample
 
 @dataclass(frozen=True)
 class VoxelFeature:
-    """One number of a voxel: its name, its unit (``m``, ``m^2`` or ``1``) and what it says."""
+    """A feature: its name, its unit (``m``, ``m^2`` or ``1``) and its meaning."""
 
     name: str
     unit: str
@@ -33,47 +32,49 @@ class VoxelFeature:
 
 
 FEATURES = (
-    VoxelFeature("height", "m", "above the ground below"),
-    VoxelFeature("run_1", "m", "length of the unbroken vertical run it is in, 1 m about it"),
-    VoxelFeature("run_2", "m", "the same, 2 m about it"),
-    VoxelFeature("run_up_2", "m", "how much of that run lies above"),
+    VoxelFeature("height", "m", "height above the ground"),
+    VoxelFeature("run_1", "m", "length of the vertical run around it, in the columns within 1 m"),
+    VoxelFeature("run_2", "m", "the same within 2 m"),
+    VoxelFeature("run_up_2", "m", "length of the part of that run above the voxel"),
     VoxelFeature("top_1", "m", "height above ground of the highest voxel within 1 m (planar)"),
     VoxelFeature("top_2", "m", "the same within 2 m"),
-    VoxelFeature("filled_above_2", "m", "occupied heights above, 2 m about it"),
-    VoxelFeature("filled_5_above_2", "m", "of these, within the next 5 m"),
-    VoxelFeature("filled_5_below_2", "m", "occupied heights in the 5 m below, 2 m about it"),
-    VoxelFeature("share_below_2", "1", "share of the heights down to the ground, 2 m about it"),
-    VoxelFeature("reach_3", "1", "share of the columns within 3 m that reach this height"),
+    VoxelFeature("filled_above_2", "m", "occupied heights above it, in the columns within 2 m"),
+    VoxelFeature("filled_5_above_2", "m", "the same in the next 5 m"),
+    VoxelFeature("filled_5_below_2", "m", "occupied heights in the 5 m below it, within 2 m"),
+    VoxelFeature("share_below_2", "1", "occupied share of the heights down to the ground, 2 m"),
+    VoxelFeature("reach_3", "1", "share of the columns within 3 m that reach its height"),
     VoxelFeature("reach_6", "1", "the same within 6 m"),
-    VoxelFeature("protrusion", "m", "above the highest column between 3 and 7 m away"),
-    VoxelFeature("overtop_12", "m", "how far the highest column within 12 m lies above"),
+    VoxelFeature("protrusion", "m", "height above the highest column between 3 and 7 m away"),
+    VoxelFeature("overtop_12", "m", "height of the highest column within 12 m above the voxel"),
     VoxelFeature("mean_top_6", "m", "mean height above ground of the columns within 6 m"),
     VoxelFeature("tall_6", "1", "share of the columns within 6 m that are taller than 3 m"),
     VoxelFeature("tall_ring", "1", "the same between 6 and 12 m away"),
-    VoxelFeature("area_2", "m^2", "occupied voxels within 2 m, each a voxel's face in size"),
+    VoxelFeature("area_2", "m^2", "number of occupied voxels within 2 m, times a voxel's face"),
     VoxelFeature("area_4", "m^2", "the same within 4 m"),
     VoxelFeature("linearity_4", "1", "(l1 - l2) / l1 of the occupied voxels within 4 m"),
     VoxelFeature("planarity_4", "1", "(l2 - l3) / l1 of the same"),
     VoxelFeature("verticality_4", "1", "|z| of their main axis"),
     VoxelFeature("points_2", "1", "log(1 + points within 2 m / median of the occupied voxels)"),
     VoxelFeature("column_points", "1", "log(1 + points of its column / median of the columns)"),
-    VoxelFeature("wire_distance", "m", "planar distance to the nearest wire-like voxel, up to 50"),
-    VoxelFeature("wire_6", "m", "length of wire-like voxels within 6 m (planar)"),
+    VoxelFeature("conductor_distance", "m", "planar distance to the nearest linear voxel, max. 50"),
+    VoxelFeature("conductor_6", "m", "length of the linear voxels within 6 m (planar)"),
 )
 """The columns of ``voxel_features``."""
 
 GROUND_WINDOW_M = 9.0
-"""What is narrower and stands above its surroundings is not ground."""
+"""Objects narrower than this are not ground."""
 GROUND_SMOOTHING_M = 1.5
 RUN_GAP_M = 1.0
-"""A run goes on over gaps up to this: lattice and thin scans leave heights empty."""
+"""Largest gap within a vertical run: lattice towers and sparse scans leave heights empty."""
 STRAY_M, STRAY_NEIGHBOURS = 4.0, 3
-"""With fewer others this near a voxel is a stray return (birds, sky), which tops are free of."""
+"""A voxel with at most this many occupied voxels within this radius, itself included, is a stray
+return (a bird, noise), which the heights ignore."""
 TALL_M = 3.0
 TOP_M = 0.7
-WIRE_LINEARITY, WIRE_VERTICALITY, WIRE_HEIGHT_M = 0.85, 0.5, 4.0
-"""Linear, lying, and above bushes: wire-like."""
-FARTHEST_WIRE_M = 50.0
+MIN_LINEARITY, MAX_VERTICALITY, MIN_CONDUCTOR_HEIGHT_M = 0.85, 0.5, 4.0
+"""A voxel is linear, and may be part of a conductor, within these limits: long and thin, nearly
+level, and above bushes."""
+FARTHEST_CONDUCTOR_M = 50.0
 
 
 def voxel_features(sample: VoxelSample) -> np.ndarray:
@@ -98,17 +99,22 @@ def voxel_features(sample: VoxelSample) -> np.ndarray:
         "verticality_4": verticality,
     }
     values |= scene.points(near[:, 10])
-    values |= scene.wires(
-        (linearity > WIRE_LINEARITY) & (verticality < WIRE_VERTICALITY) & (height > WIRE_HEIGHT_M)
+    level = verticality < MAX_VERTICALITY
+    values |= scene.conductors(
+        (linearity > MIN_LINEARITY) & level & (height > MIN_CONDUCTOR_HEIGHT_M)
     )
     return np.stack([values[f.name] for f in FEATURES], axis=1).astype(np.float32)
 
 
 class _Scene(NamedTuple):
-    """A sample spread out: occupied voxels (M,) and the grid they lie on.
+    """The occupied voxels of a sample, as a list and as grids.
 
-    ``points_in`` (D, H, W) int32 holds how many points are where, and ``solid`` (D, H, W) uint8 is
-    where anything but a stray return is.
+    Attributes:
+        zyx: (M, 3) int32 positions of the occupied voxels.
+        kept: (M,) bool, False for stray returns.
+        points_in: (D, H, W) int32, number of points in each voxel.
+        solid: (D, H, W) uint8, 1 in occupied voxels without the stray returns.
+        voxel_size: m.
     """
 
     zyx: np.ndarray
@@ -127,7 +133,7 @@ class _Scene(NamedTuple):
         return cls(zyx, np.ones(len(zyx), bool), points, solid, sample.grid.voxel_size)
 
     def without(self, stray: np.ndarray) -> _Scene:
-        """The same without the voxels ``stray`` (M,), all of them kept if all are."""
+        """The same without the voxels ``stray`` (M,) bool; unchanged if all are stray."""
         if stray.all():
             return self
         solid = self.solid.copy()
@@ -136,18 +142,19 @@ class _Scene(NamedTuple):
 
     @property
     def middle(self) -> np.ndarray:
-        """(M,) m, height of the voxels above the grid's floor."""
+        """(M,) m, height of the voxel centres above the floor of the grid."""
         return (self.zyx[:, 0] + 0.5) * self.voxel_size
 
     def at(self, raster: np.ndarray) -> np.ndarray:
-        """(M,) of a raster (H, W)."""
+        """(M,) values of a raster (H, W) at the voxels."""
         return raster[self.zyx[:, 1], self.zyx[:, 2]]
 
     def tops(self) -> np.ndarray:
-        """(H, W) m, upper face of the highest voxel within ``TOP_M`` of each column.
+        """(H, W) m, upper face of the highest voxel within ``TOP_M`` of each column; NaN if there
+        is none.
 
-        In voxels below 0.7 m a wire counts for the columns beside it as well, so that it takes up
-        about as much of the surroundings as in voxels of 1 m. NaN where all these are empty.
+        With voxels below 0.7 m a conductor also counts for the neighbouring columns, so that it
+        covers about as much of the surroundings as with voxels of 1 m.
         """
         highest = self.solid.shape[0] - self.solid[::-1].argmax(axis=0)
         tops = np.where(self.solid.any(axis=0), highest * self.voxel_size, -np.inf)
@@ -159,10 +166,11 @@ class _Scene(NamedTuple):
         return np.where(np.isfinite(tops), tops, np.nan)
 
     def ground(self) -> np.ndarray:
-        """(H, W) m above the grid's floor: lowest returns, freed of what stands on the ground.
+        """(H, W) m, elevation of the ground above the floor of the grid.
 
-        Columns without any take the nearest one's. A median takes single low returns away, and an
-        opening all that is narrower than its window, also on a slope.
+        It is computed from the lowest voxel of each column; empty columns take the nearest one. A
+        median removes single low returns, and an opening removes objects narrower than its window,
+        also on slopes.
         """
         some = self.solid.any(axis=0)
         nearest = ndimage.distance_transform_edt(~some, return_distances=False, return_indices=True)
@@ -177,7 +185,7 @@ class _Scene(NamedTuple):
         return _moments(self.points_in, self.zyx, _ball(radius, self.voxel_size))
 
     def columns(self, ground: np.ndarray) -> dict[str, np.ndarray]:
-        """What is above and below a voxel."""
+        """Features of the columns around a voxel, above and below it."""
         depth, _, width = self.solid.shape
         h, z = self.voxel_size, self.zyx[:, 0]
         column, of = np.unique(self.zyx[:, 1] * width + self.zyx[:, 2], return_inverse=True)
@@ -189,7 +197,7 @@ class _Scene(NamedTuple):
             filled = _union(upright, yx, _disk(radius, h))
             highest = np.where(filled.any(axis=1), depth - filled[:, ::-1].argmax(axis=1), 0)
             up, down = _runs(filled, int(RUN_GAP_M / h + 1e-9))
-            # A stray return is in no run.
+            # A stray return belongs to no run.
             values[f"run_{radius:g}"] = np.maximum(up[of, z] + down[of, z] - 1, 0) * h
             values[f"top_{radius:g}"] = highest[of] * h - floor
         below = np.zeros((len(filled), depth + 1), np.int32)
@@ -206,7 +214,7 @@ class _Scene(NamedTuple):
         }
 
     def surroundings(self, ground: np.ndarray) -> dict[str, np.ndarray]:
-        """The columns around a voxel."""
+        """Features of the heights around a voxel."""
         h, z, tops = self.voxel_size, self.middle, self.tops()
         stature, tall = tops - ground, np.full(len(self.zyx), TALL_M)
 
@@ -225,29 +233,29 @@ class _Scene(NamedTuple):
         }
 
     def points(self, near: np.ndarray) -> dict[str, np.ndarray]:
-        """Numbers of points, in relation to the crop's: surveys differ in density."""
+        """Numbers of points relative to the median of the crop, as surveys differ in density."""
         columns = self.points_in.sum(axis=0)
         return {
             "points_2": np.log1p(near / np.median(near)),
             "column_points": np.log1p(self.at(columns) / np.median(columns[columns > 0])),
         }
 
-    def wires(self, like: np.ndarray) -> dict[str, np.ndarray]:
-        """Where the wire-like voxels ``like`` (M,) are."""
-        wire = np.zeros(self.solid.shape[1:])
-        z, y, x = self.zyx[like & self.kept].T
-        np.add.at(wire, (y, x), self.voxel_size)
-        distance = np.full(wire.shape, FARTHEST_WIRE_M)
+    def conductors(self, linear: np.ndarray) -> dict[str, np.ndarray]:
+        """Distance to and length of the ``linear`` voxels (M,) bool."""
+        length = np.zeros(self.solid.shape[1:])
+        z, y, x = self.zyx[linear & self.kept].T
+        np.add.at(length, (y, x), self.voxel_size)
+        distance = np.full(length.shape, FARTHEST_CONDUCTOR_M)
         if len(z):
-            apart = ndimage.distance_transform_edt(wire == 0) * self.voxel_size
-            distance = np.minimum(apart, FARTHEST_WIRE_M)
-        places = np.unique(self.zyx[like & self.kept][:, 1:], axis=0)
-        length = _spread(wire, places, _disk(6.0, self.voxel_size))
-        return {"wire_distance": self.at(distance), "wire_6": self.at(length)}
+            exact = ndimage.distance_transform_edt(length == 0) * self.voxel_size
+            distance = np.minimum(exact, FARTHEST_CONDUCTOR_M)
+        places = np.unique(self.zyx[linear & self.kept][:, 1:], axis=0)
+        nearby = _spread(length, places, _disk(6.0, self.voxel_size))
+        return {"conductor_distance": self.at(distance), "conductor_6": self.at(nearby)}
 
 
 def _odd(metres: float, voxel_size: float) -> int:
-    """Voxels of the window that is ``metres`` wide, at least one and with a middle."""
+    """Odd number of voxels, at least one, in a window ``metres`` wide."""
     return 2 * round(metres / voxel_size / 2) + 1
 
 
@@ -256,8 +264,8 @@ def _disk(outer: float, voxel_size: float, inner: float = -1.0) -> np.ndarray:
     reach = int(outer / voxel_size + 1e-9)
     steps = np.arange(-reach, reach + 1)
     y, x = np.meshgrid(steps, steps, indexing="ij")
-    apart = np.hypot(y, x) * voxel_size
-    inside = (apart <= outer + 1e-9) & (apart > inner)
+    distance = np.hypot(y, x) * voxel_size
+    inside = (distance <= outer + 1e-9) & (distance > inner)
     return np.stack([y[inside], x[inside]], axis=1).astype(np.int32)
 
 
@@ -271,10 +279,8 @@ def _ball(radius: float, voxel_size: float) -> np.ndarray:
 
 
 def _axes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Linearity, planarity and verticality, each (M,) in [0, 1], from ``_moments``.
-
-    All are 0 where the voxels have no extent.
-    """
+    """Linearity, planarity and verticality, each (M,) in [0, 1], from ``_moments``; 0 if the voxels
+    have no extent."""
     number = np.maximum(moments[:, 0], 1)[:, None]
     mean = moments[:, 1:4] / number
     covariance = np.empty((len(moments), 3, 3))
@@ -292,7 +298,8 @@ def _axes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 @numba.njit(cache=True)
 def _moments(points, zyx, steps):  # pragma: no cover - compiled
-    """(M, 11): n, z, y, x, zz, yy, xx, zy, zx, yx, points, summed over the voxels at ``steps``."""
+    """(M, 11): sums of 1, z, y, x, zz, yy, xx, zy, zx, yx and points over the voxels at ``steps``
+    from each voxel."""
     depth, height, width = points.shape
     out = np.zeros((len(zyx), 11))
     for i in range(len(zyx)):
@@ -318,7 +325,7 @@ def _moments(points, zyx, steps):  # pragma: no cover - compiled
 
 @numba.njit(cache=True)
 def _union(upright, yx, steps):  # pragma: no cover - compiled
-    """(C, D) uint8: at which heights any of the columns at ``steps`` about a column is occupied."""
+    """(C, D) uint8: heights at which any of the columns at ``steps`` from a column is occupied."""
     height, width, depth = upright.shape
     out = np.zeros((len(yx), depth), np.uint8)
     for i in range(len(yx)):
@@ -332,9 +339,9 @@ def _union(upright, yx, steps):  # pragma: no cover - compiled
 
 @numba.njit(cache=True)
 def _runs(filled, gap):  # pragma: no cover - compiled
-    """Heights that the run at each place has upwards and downwards, itself included, (C, D) twice.
+    """Length of the run at each height upwards and downwards, itself included, two (C, D) arrays.
 
-    A run goes on over up to ``gap`` empty heights; in these it has no length.
+    A run may contain gaps of up to ``gap`` empty heights; the length is 0 at empty heights.
     """
     n, depth = filled.shape
     up, down = np.zeros((n, depth), np.int32), np.zeros((n, depth), np.int32)
@@ -358,9 +365,10 @@ def _runs(filled, gap):  # pragma: no cover - compiled
 
 @numba.njit(cache=True)
 def _around(raster, zyx, level, steps):  # pragma: no cover - compiled
-    """(M, 3): of the places at ``steps``, the share that reaches ``level``, the mean, the highest.
+    """(M, 3): over the columns at ``steps``, the share that reaches ``level``, the mean and the
+    maximum.
 
-    NaN places do not count; where no other is, the mean and the highest are ``level``.
+    Columns with NaN do not count; without any other, the mean and the maximum are ``level``.
     """
     height, width = raster.shape
     out = np.zeros((len(zyx), 3))
@@ -383,7 +391,7 @@ def _around(raster, zyx, level, steps):  # pragma: no cover - compiled
 
 @numba.njit(cache=True)
 def _spread(raster, places, steps):  # pragma: no cover - compiled
-    """(H, W): for each place the sum of ``raster`` over the ``places`` (P, 2) within ``steps``."""
+    """(H, W): at each column the sum of ``raster`` over the ``places`` (P, 2) within ``steps``."""
     height, width = raster.shape
     out = np.zeros((height, width))
     for i in range(len(places)):

@@ -1,12 +1,13 @@
-"""How fast the engine is, beside what else there is for the same work.
+"""Speed of the package compared with alternative implementations of the same work.
 
-``scenenet bench`` runs it; ``docs/method/performance.md`` tells what was measured and why it is so.
+``scenenet bench`` runs it; ``docs/method/performance.md`` has the measurements and explains them.
 
-- ``crops``: what is measured on.
-- ``peers``: the other ways to the same result.
+- ``crops``: the crops that are measured on.
+- ``peers``: the alternative implementations.
 - ``timing``: medians of interleaved runs.
-- ``sections``: one function for each section of the answer.
-- ``report``: the answer as tables.
+- ``measurements``: one function for each part of the benchmark.
+- ``thesis_training``: the training of the thesis at its scale.
+- ``report``: the result as tables.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What the benchmark runs on: crops around towers, synthetic or the user's own."""
+"""The crops that the benchmark runs on: synthetic ones or the user's own."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scenenet.pointcloud.ts40k import sample_files
 
 
 def synthetic_crops(n: int, seed: int = 0) -> list[PointCloud]:
-    """``n`` crops of a synthetic line, each as wide around its tower as the tower is high."""
+    """``n`` crops of a synthetic line, each with the points within one tower height."""
     from scenenet.synthetic import SyntheticSettings, corridor_cloud
 
     cloud, _, towers = corridor_cloud(SyntheticSettings(towers=n, seed=seed))
@@ -24,13 +24,13 @@ def synthetic_crops(n: int, seed: int = 0) -> list[PointCloud]:
 
 
 def crops_in(folder: Path, codes: str) -> list[PointCloud]:
-    """The samples of a folder (TS40K .npy or .pt), in the order of their names.
+    """The samples of a folder (TS40K .npy or .pt), ordered by name.
 
     Args:
         codes: class scheme of the labels.
 
     Raises:
-        InputError: there is none, or one cannot be read.
+        InputError: the folder or a sample cannot be read, or there is no sample.
     """
     if not folder.is_dir():
         raise InputError("not a folder", file=folder, remedy="Name a folder of .npy or .pt samples")

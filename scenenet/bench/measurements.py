@@ -1,4 +1,4 @@
-"""The sections of the benchmark: what is run beside what, and the numbers that come of it."""
+"""The parts of the benchmark: each times this package against alternative implementations."""
 
 from __future__ import annotations
 
@@ -30,26 +30,27 @@ from scenenet.pointcloud import PointCloud
 from scenenet.training.losses import VoxelWeights, fidelity, negativity
 
 SIZES: tuple[KernelSize, ...] = ((9, 9, 9), (9, 5, 5), (12, 5, 5))
-"""The thesis' size in training, its size after tuning, and an even one that is often better."""
+"""The thesis' kernel size in training and after tuning, and an even size that is often better."""
 RESOLUTIONS = (64, 128)
 BATCH = 8
 
 
 class BenchSettings(Settings):
-    """What the benchmark runs."""
+    """The parts of the benchmark that run, and on which crops."""
 
     crops: Path | None = Field(None, description="folder of samples; synthetic crops if null")
     codes: str = Field("edp", description="class scheme of the samples")
-    quick: bool = Field(False, description="the convolution alone, with few repetitions")
-    thesis: bool = Field(False, description="also train once as the thesis did, at its scale")
+    quick: bool = Field(False, description="only the convolution, with few repetitions")
+    thesis: bool = Field(False, description="also run the training of the thesis at its scale")
 
 
 def bench(settings: BenchSettings) -> dict[str, Any]:
     """Run the benchmark.
 
     Returns:
-        convolution, gradient, training_step, voxelisation, survey and machine (``quick``:
-        convolution and machine), and thesis_training where asked for; plain numbers, times in ms.
+        convolution, gradient, training_step, voxelisation, survey, crops and machine (``quick``:
+        convolution, crops and machine), and thesis_training if ``settings.thesis``; plain numbers,
+        times in ms.
 
     Raises:
         InputError: a crop cannot be read.
@@ -93,10 +94,10 @@ def bench(settings: BenchSettings) -> dict[str, Any]:
 
 
 def convolution(grids: dict[int, list[VoxelSample]], repetitions: int) -> dict[str, Any]:
-    """One crop through one summed kernel, beside torch's dense and Fourier convolutions.
+    """Convolution of a crop with a summed kernel, compared with torch's dense and Fourier ones.
 
-    The crop is the one of median occupancy. ``conv3d_f32_ms`` is the better of one summed and three
-    kernels; the reference way is double precision and three kernels.
+    The crop has the median occupancy. ``conv3d_f32_ms`` is the faster of one summed and three
+    kernels; the reference is the published code: double precision and three kernels.
     """
     return {
         str(resolution): {_named(size): _convolution(samples, size, repetitions) for size in SIZES}
@@ -105,7 +106,7 @@ def convolution(grids: dict[int, list[VoxelSample]], repetitions: int) -> dict[s
 
 
 def gradient(grids: dict[int, list[VoxelSample]]) -> dict[str, Any]:
-    """The gradient with respect to the kernel, beside the forward way and torch's gradient."""
+    """The gradient with respect to the kernel, compared with the forward pass and with torch."""
     return {
         str(resolution): {_named(size): _gradient(samples, size) for size in SIZES}
         for resolution, samples in grids.items()
@@ -133,12 +134,12 @@ def _convolution(samples: list[VoxelSample], size: KernelSize, repetitions: int)
         },
         repetitions,
     )
-    # Seconds a run, thousands of times as long as ours: one or a few are enough.
-    reference = {"reference": lambda: peers.reference_way(volume, kernels)}
+    # A run takes seconds, thousands of times as long as ours, so few runs are enough.
+    reference = {"reference": lambda: peers.published_code(volume, kernels)}
     slow = medians(reference, 3, most_seconds=0.5 if repetitions < 10 else 20.0)["reference"]
     conv3d = min(times["summed"], times["three"])
-    theirs = peers.conv3d_summed(volume, kernels)
-    difference = (convolve(occupancy, kernel) - theirs).abs().max() / theirs.abs().max()
+    dense = peers.conv3d_summed(volume, kernels)
+    difference = (convolve(occupancy, kernel) - dense).abs().max() / dense.abs().max()
     return {
         "ours_ms": times["ours"],
         "conv3d_f32_ms": conv3d,
@@ -156,13 +157,13 @@ def _gradient(samples: list[VoxelSample], size: KernelSize) -> dict[str, Any]:
     occupancy, volume = _median_crop(samples)
     upstream = torch.randn(volume.shape, generator=torch.Generator().manual_seed(0))
     weight = _kernels(size)[:1].requires_grad_()
-    answer = peers.conv3d_summed(volume, weight)
+    output = peers.conv3d_summed(volume, weight)
     kernel = weight.detach()[0]
     times = medians(
         {
             "ours": lambda: convolution_gradient(occupancy, upstream, size),
             "forward": lambda: convolve(occupancy, kernel),
-            "conv3d": lambda: torch.autograd.grad(answer, weight, upstream, retain_graph=True),
+            "conv3d": lambda: torch.autograd.grad(output, weight, upstream, retain_graph=True),
         },
         15,
     )
@@ -176,7 +177,8 @@ def _gradient(samples: list[VoxelSample], size: KernelSize) -> dict[str, Any]:
 
 
 def training_step(samples: list[VoxelSample]) -> dict[str, Any]:
-    """A step of SCENE-Net: kernels, convolution, loss, backward, optimiser; dense beside ours."""
+    """A training step of SCENE-Net: kernels, convolution, loss, backward pass and optimiser; with
+    the sparse and with the dense convolution."""
     chosen = [samples[i % len(samples)] for i in range(BATCH)]
     size = (9, 9, 9)
     model = SceneNet(kernel_size=size, generator=torch.Generator().manual_seed(0))
@@ -210,7 +212,7 @@ def training_step(samples: list[VoxelSample]) -> dict[str, Any]:
 
 
 def voxelisation(crops: list[PointCloud]) -> dict[str, Any]:
-    """A crop to counts and truth, beside a grouping in pandas."""
+    """Voxelisation of a crop into counts and labels, compared with a grouping in pandas."""
     crop = sorted(crops, key=len)[len(crops) // 2]
     return {str(resolution): _voxelisation(crop, resolution) for resolution in RESOLUTIONS}
 
@@ -233,7 +235,7 @@ def _voxelisation(crop: PointCloud, resolution: int) -> dict[str, Any]:
 
 
 def survey() -> dict[str, Any]:
-    """A survey from file to file, beside laspy alone reading and writing the same points."""
+    """Prediction of a survey from file to file, compared with laspy reading and writing it."""
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.model_file import ModelCard, write_model
     from scenenet.prediction.settings import PredictSettings
@@ -269,7 +271,7 @@ def survey() -> dict[str, Any]:
 
 
 def machine() -> dict[str, Any]:
-    """What the numbers were measured on."""
+    """The machine and the versions of the measurement."""
     return {
         "processor": _processor(),
         "cores": len(os.sched_getaffinity(0))
@@ -286,14 +288,14 @@ def machine() -> dict[str, Any]:
 
 
 def _median_crop(samples: list[VoxelSample]) -> tuple[Occupancy, torch.Tensor]:
-    """The crop of median occupancy, as list and as dense volume (1, D, H, W)."""
+    """The crop of median occupancy, sparse and as a dense volume (1, D, H, W)."""
     middle = sorted(samples, key=lambda sample: len(sample.index))[len(samples) // 2]
     occupancy, _ = batch([middle], "presence")
     return occupancy, occupancy.dense()
 
 
 def _kernels(size: KernelSize) -> torch.Tensor:
-    """Three kernels (3, kz, ky, kx) with nothing special about them."""
+    """Three random kernels (3, kz, ky, kx)."""
     return torch.randn((3, *size), generator=torch.Generator().manual_seed(0))
 
 

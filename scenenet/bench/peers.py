@@ -1,4 +1,4 @@
-"""The other ways to the same results: what the engine is measured against."""
+"""Alternative implementations that the benchmark compares with."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ def conv3d_summed(volume: Tensor, kernels: Tensor) -> Tensor:
 
 
 def conv3d_three(volume: Tensor, kernels: Tensor) -> Tensor:
-    """torch's dense convolution with each of the kernels, then their sum."""
+    """torch's dense convolution with each of the kernels, and the sum of the results."""
     return _same(volume, kernels).sum(dim=1)
 
 
-def reference_way(volume: Tensor, kernels: Tensor) -> Tensor:
-    """As the thesis' published code does it: double precision, every kernel by itself."""
-    answers = [_same(volume.double(), kernel[None].double()) for kernel in kernels]
-    return torch.stack(answers).sum(dim=0)[:, 0]
+def published_code(volume: Tensor, kernels: Tensor) -> Tensor:
+    """As in the published code of the thesis: double precision, one convolution per kernel."""
+    responses = [_same(volume.double(), kernel[None].double()) for kernel in kernels]
+    return torch.stack(responses).sum(dim=0)[:, 0]
 
 
 def fft_summed(volume: Tensor, kernels: Tensor) -> Tensor:
-    """By way of the Fourier transform, with the sum of the kernels."""
+    """Convolution with the sum of the kernels through the Fourier transform."""
     kernel = kernels.sum(0)
     shape = tuple(n + k - 1 for n, k in zip(volume.shape[1:], kernel.shape, strict=True))
     spectrum = torch.fft.rfftn(volume, s=shape, dim=(1, 2, 3))
@@ -45,14 +45,14 @@ def fft_summed(volume: Tensor, kernels: Tensor) -> Tensor:
 
 
 def pandas_voxels(cloud: PointCloud, grid: VoxelGrid) -> tuple[np.ndarray, np.ndarray]:
-    """Counts and truth of a crop in the steps of the thesis' published code.
+    """Counts and labels of a crop, computed as in the published code of the thesis.
 
-    The measurement and the truth are made one after the other, each from a voxel grid of its own:
-    a search for the voxel along each axis and the middles of all voxels (as pyntcloud makes its
-    grid), a grouping in pandas, and a dense grid that is filled group by group.
+    The code computes counts and labels one after the other, each with its own voxel grid: it finds
+    the voxel of each point along each axis, computes the centres of all voxels (as pyntcloud does),
+    groups the points in pandas, and fills a dense grid group by group.
 
     Returns:
-        (D, H, W) float64 counts, scaled to [0, 1], and truth.
+        (D, H, W) float64 counts, scaled to [0, 1], and labels.
     """
     counts, truth = np.zeros(grid.shape), np.zeros(grid.shape)
     groups = pd.DataFrame(_places(cloud.xyz, grid) | {"points": 1}).groupby(["z", "y", "x"])
@@ -66,7 +66,8 @@ def pandas_voxels(cloud: PointCloud, grid: VoxelGrid) -> tuple[np.ndarray, np.nd
 
 
 def _places(xyz: np.ndarray, grid: VoxelGrid) -> dict[str, np.ndarray]:
-    """Position of each point along each axis, and the middles of all voxels, which nobody asks."""
+    """Position of each point along each axis. The centres of all voxels are computed as well,
+    because the published code does so, and are not used."""
     nz, ny, nx = grid.shape
     borders = [
         np.linspace(low, low + n * grid.voxel_size, n + 1)
@@ -83,7 +84,7 @@ def _places(xyz: np.ndarray, grid: VoxelGrid) -> dict[str, np.ndarray]:
 def dense_error(
     volume: Tensor, kernel: Tensor, tower: np.ndarray, weights: tuple[float, float]
 ) -> Tensor:
-    """The error of a training step by dense passes: conv3d, tanh, ReLU, weighted squares."""
+    """The error of a training step with dense operations: conv3d, tanh, ReLU, weighted squares."""
     prediction = torch.relu(torch.tanh(conv3d_summed(volume, kernel[None])))
     truth = torch.zeros_like(prediction)
     truth.view(-1)[torch.from_numpy(tower)] = 1
@@ -92,7 +93,7 @@ def dense_error(
 
 
 def read_and_write(path: Path, out: Path, chunk_points: int) -> None:
-    """All that any reader and writer of a survey has to do: laspy alone, in chunks."""
+    """Read a survey and write it again with laspy, in chunks: the least that any tool must do."""
     import laspy
 
     with laspy.open(path) as reader, laspy.open(out, mode="w", header=reader.header) as writer:
@@ -102,6 +103,6 @@ def read_and_write(path: Path, out: Path, chunk_points: int) -> None:
 
 def _same(volume: Tensor, kernels: Tensor) -> Tensor:
     with warnings.catch_warnings():
-        # torch says of even sizes that they may cost a copy, which is part of what is measured.
+        # For even sizes torch warns about a copy, whose time belongs to the measurement.
         warnings.filterwarnings("ignore", message="Using padding='same'")
         return functional.conv3d(volume[:, None], kernels[:, None], padding="same")

@@ -1,4 +1,4 @@
-"""The answer of the benchmark as text."""
+"""The result of the benchmark as text."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 
 
 def tables(result: dict[str, Any]) -> list[str]:
-    """Lines of Markdown: a table for each section that was run."""
+    """Lines of Markdown: a table for each part that was run."""
     machine = result["machine"]
     occupied = [crop["occupied_64"] / 64**3 for crop in result["crops"]]
     lines = [
         f"{machine['processor']}, {machine['threads']} threads, torch {machine['torch']}, "
         f"numba {machine['numba']}; medians of interleaved runs.",
         f"{len(occupied)} crops, {100 * min(occupied):.1f}-{100 * max(occupied):.1f} % of the "
-        f"voxels occupied at 64^3; a convolution runs on the crop of median occupancy.",
+        f"voxels occupied at 64^3; the convolution runs on the crop of median occupancy.",
         "",
         *_convolution(result["convolution"]),
     ]
@@ -27,8 +27,8 @@ def tables(result: dict[str, Any]) -> list[str]:
         lines += [
             "",
             f"Training as in the thesis ({entry['crops']} crops, {entry['epochs']} epochs, 9x9x9, "
-            f"64^3): {entry['seconds']:.0f} s, {entry['ms_per_step']:.1f} ms a step; "
-            f"the thesis: {entry['thesis_minutes']:.0f} minutes on an RTX 3070.",
+            f"64^3): {entry['seconds']:.0f} s, {entry['ms_per_step']:.1f} ms per step. "
+            f"The thesis took {entry['thesis_minutes']:.0f} minutes on an RTX 3070.",
         ]
     return lines
 
@@ -50,8 +50,9 @@ def _convolution(section: dict[str, Any]) -> list[str]:
         for resolution, sizes in section.items()
         for size, entry in sizes.items()
     ]
-    head = ["grid", "kernel", "ours ms", "on one core", "conv3d", "FFT", "reference way"]
-    return _table([*head, "times conv3d", "times reference", "cores"], rows)
+    head = ["grid", "kernel", "ours ms", "on one core", "conv3d", "FFT", "reference ms"]
+    head += ["faster than conv3d", "faster than reference", "speed-up by more cores"]
+    return _table(head, rows)
 
 
 def _gradient(section: dict[str, Any]) -> list[str]:
@@ -67,7 +68,8 @@ def _gradient(section: dict[str, Any]) -> list[str]:
         for resolution, sizes in section.items()
         for size, entry in sizes.items()
     ]
-    head = ["grid", "kernel", "gradient ms", "of the forward way", "conv3d", "times conv3d"]
+    head = ["grid", "kernel", "gradient ms", "relative to the forward pass", "conv3d"]
+    head.append("faster than conv3d")
     return ["", *_table(head, rows)]
 
 
@@ -98,7 +100,7 @@ def _work(result: dict[str, Any]) -> list[str]:
             f"{1 / survey['times_laspy']:.2f}",
         ]
     )
-    return ["", *_table(["work", "ours", "peer", "times as fast"], rows)]
+    return ["", *_table(["work", "ours", "peer", "speed relative to the peer"], rows)]
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -1,4 +1,4 @@
-"""Medians of runs that take turns, so that a busy moment of the machine meets all of them."""
+"""Medians of interleaved runs, so that a busy moment of the machine affects all of them."""
 
 from __future__ import annotations
 
@@ -9,45 +9,42 @@ from typing import Any
 import numpy as np
 
 FAST_MS = 20.0
-"""What takes less is run some times before each timed run: caches, threads and memory are then as
-they are in the middle of work, and not as another way left them."""
+"""A task faster than this runs a few times before each timed run, so that the other tasks do not
+influence the state of caches, threads and memory."""
 WARM_RUNS = 3
 
 SLOW_SECONDS = 1.0
-"""From here on the first run of a way is as good as any."""
+"""The first run of a task slower than this counts: start-up costs hardly affect it."""
 
 
 def medians(
-    ways: Mapping[str, Callable[[], Any]], repetitions: int, most_seconds: float = 20.0
+    tasks: Mapping[str, Callable[[], Any]], repetitions: int, most_seconds: float = 20.0
 ) -> dict[str, float]:
-    """Median time of each way, in ms.
+    """Median time of each task, in ms, by name.
 
     Args:
-        ways: what to run, by name.
+        tasks: functions to time, by name.
         repetitions: timed runs of each.
-        most_seconds: a way that has used up so much is not run again; it has run once at least.
-
-    Returns:
-        by the same names.
+        most_seconds: a task that has taken longer in total is not run again; every task runs once.
     """
-    times: dict[str, list[float]] = {name: [] for name in ways}
-    for name, way in ways.items():
-        # The first run compiles, allocates and imports; it counts only where that is nothing to it.
-        seconds = _seconds(way)
+    times: dict[str, list[float]] = {name: [] for name in tasks}
+    for name, task in tasks.items():
+        # The first run also compiles, allocates and imports.
+        seconds = _seconds(task)
         if seconds > SLOW_SECONDS:
             times[name].append(seconds)
     for _ in range(repetitions):
-        for name, way in ways.items():
+        for name, task in tasks.items():
             if sum(times[name]) > most_seconds:
                 continue
             if not times[name] or times[name][-1] * 1e3 < FAST_MS:
                 for _ in range(WARM_RUNS):
-                    way()
-            times[name].append(_seconds(way))
+                    task()
+            times[name].append(_seconds(task))
     return {name: 1e3 * float(np.median(seconds)) for name, seconds in times.items()}
 
 
-def _seconds(way: Callable[[], Any]) -> float:
+def _seconds(task: Callable[[], Any]) -> float:
     begin = time.perf_counter()
-    way()
+    task()
     return time.perf_counter() - begin

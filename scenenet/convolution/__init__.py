@@ -1,1 +1,1 @@
-"""The occupancy convolution: a kernel over the occupied voxels of a grid (thesis 4.3)."""
+"""The convolution of a kernel with the occupied voxels of a grid (thesis 4.3)."""

@@ -1,9 +1,9 @@
-"""A finer grid seen at the voxel size that a model in metres observes at.
+"""Coarsening of fine grids to blocks of about a metre, for models in metres.
 
-A survey has a few points a square metre on a tower. In voxels much smaller than a metre its body
-falls apart into single points, and what a kernel counts there is the density of the survey and not
-the tower. So a model in metres observes a fine grid through blocks of voxels of about
-``OBSERVED_M``, and a voxel has the answer of the block it lies in.
+A survey has a few points per square metre on a tower. In voxels much smaller than a metre the body
+of a tower becomes a set of single points, and a kernel measures the density of the survey instead
+of the tower. A model in metres therefore observes a fine grid in blocks of about ``OBSERVED_M``,
+and each voxel takes the response of its block.
 """
 
 from __future__ import annotations
@@ -13,22 +13,22 @@ import numpy as np
 from scenenet.convolution.occupancy import Occupancy
 
 OBSERVED_M = 1.0
-"""Edge of the blocks, m: about the voxels of 64^3 over a crop of two tower heights."""
+"""Edge of the blocks, m: about the voxel size of a 64^3 grid over a crop of two tower heights."""
 
 
 def block_edge(voxel_size: float) -> int:
-    """Voxels an edge of the block that comes nearest to ``OBSERVED_M``; at least 1."""
+    """Voxels per edge of the block whose size is nearest to ``OBSERVED_M``; at least 1."""
     return max(1, round(OBSERVED_M / voxel_size))
 
 
 def coarsened(occupancy: Occupancy, edge: int) -> tuple[Occupancy, np.ndarray]:
     """The grids in blocks of ``edge`` voxels, and the block of each voxel.
 
-    A block is occupied where any of its voxels is, by the largest of their values.
+    A block is occupied if any of its voxels is, and takes the largest of their values.
 
     Returns:
-        the coarse grids, whose last blocks may stick out over the high sides, and the row (M,)
-        int64 in their ``index`` of each voxel of ``occupancy``.
+        the coarse grids, whose last blocks may extend beyond the high sides, and for each voxel of
+        ``occupancy`` the row (M,) int64 of its block in their ``index``.
     """
     if edge == 1:
         return occupancy, np.arange(len(occupancy.index))

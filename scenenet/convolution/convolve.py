@@ -1,12 +1,12 @@
-"""The occupancy convolution: the one hot loop of the project (thesis 4.1).
+"""The convolution over occupied voxels, where most of the time is spent (thesis 4.1).
 
-A voxel grid is 1-2 % full, so it is kept as the list of its occupied voxels, and each occupied
-voxel adds the kernel, mirrored about its anchor, to the output around it. That is the same sum as
-``torch.nn.functional.conv3d(padding="same")`` on the dense grid, in another order:
+Only 1 to 2 % of the voxels of a grid are occupied, so a grid is a list of its occupied voxels, and
+each of them adds the kernel, mirrored about its anchor, to the output around it. This is the same
+sum as ``torch.nn.functional.conv3d(padding="same")`` on the dense grid, in another order:
 
     out[p] = sum_q kernel[q] * x[p + q - a],   a = (k - 1) // 2 on each axis
 
-with x = 0 outside the grid. An even kernel reaches one voxel further up each axis than down.
+with x = 0 outside the grid. An even kernel extends one voxel further up each axis than down.
 ``docs/method/performance.md`` explains its speed.
 """
 
@@ -21,6 +21,7 @@ from scenenet.convolution.compiled.kernel_tables import kernel_of, lanes_of, tab
 from scenenet.convolution.compiled.options import TASKS, first_plane
 from scenenet.convolution.compiled.planes import gather_plane, layout, sum_plane
 from scenenet.convolution.compiled.runs import RUN
+from scenenet.convolution.compiled.volumes import fill_volume
 from scenenet.convolution.occupancy import Occupancy, Shape
 from scenenet.core.compilation import COMPILED
 
@@ -28,13 +29,12 @@ from scenenet.core.compilation import COMPILED
 def convolve(occupancy: Occupancy, kernel: Tensor) -> Tensor:
     """Convolve each grid with ``kernel``; differentiable in the kernel.
 
-    The observer is linear (thesis Eq. 4.1), so the weighted sum of kernels is convolved once, and
-    the volumes of the single ones need not be made.
+    The observer is linear (thesis Eq. 4.1), so a weighted sum of kernels needs one convolution.
 
     Args:
         occupancy: B grids of shape (D, H, W).
-        kernel: (kz, ky, kx), or K of them as (K, kz, ky, kx), float32 or float64, any size, odd or
-            even.
+        kernel: (kz, ky, kx), or (K, kz, ky, kx) for K kernels, float32 or float64; each side may be
+            odd or even.
 
     Returns:
         (B, D, H, W), or (K, B, D, H, W), of the kernel's dtype.
@@ -45,7 +45,7 @@ def convolve(occupancy: Occupancy, kernel: Tensor) -> Tensor:
 
 
 def convolve_at_voxels(occupancy: Occupancy, kernels: Tensor) -> Tensor:
-    """What ``convolve`` answers at the occupied voxels, without a volume; no gradient.
+    """The result of ``convolve`` at the occupied voxels only, without a volume; no gradient.
 
     Args:
         kernels: (K, kz, ky, kx), float32 or float64.
@@ -55,7 +55,7 @@ def convolve_at_voxels(occupancy: Occupancy, kernels: Tensor) -> Tensor:
     """
     weights = np.ascontiguousarray(kernels.detach().numpy())
     out = np.empty((len(weights), len(occupancy.index)), weights.dtype)
-    rows = _plane_rows(occupancy)
+    rows = occupancy.plane_rows(occupancy.flat())
     for k, kernel in enumerate(weights):
         table = table_of(kernel)
         _pick(occupancy.runs, table, kernel.shape[2], occupancy.index, rows, out[k])
@@ -69,7 +69,8 @@ class _Convolution(torch.autograd.Function):
         ctx.kernel_size = tuple(kernel.shape)
         weights = np.ascontiguousarray(kernel.detach().numpy())
         out = np.empty((len(occupancy), *occupancy.shape), weights.dtype)
-        _scatter(occupancy.runs, table_of(weights), weights.shape[2], out)
+        none = weights.dtype.type(0)
+        fill_volume(occupancy.runs, table_of(weights), weights.shape[2], none, False, out)
         return torch.from_numpy(out)
 
     @staticmethod
@@ -91,29 +92,10 @@ def convolution_gradient(occupancy: Occupancy, upstream: Tensor, size: Shape) ->
 
 
 def table_shape(size: Shape) -> tuple[int, int, int, int]:
-    """Shape of the table of a kernel of ``size`` (see
-    ``scenenet.convolution.compiled.kernel_tables``)."""
+    """Shape of the table of a kernel of ``size``
+    (``scenenet.convolution.compiled.kernel_tables``)."""
     kz, ky, kx = size
     return kz, 1 << RUN, ky, lanes_of(kx)
-
-
-@numba.njit(parallel=True, **COMPILED)
-def _scatter(runs, table, kx, out):  # pragma: no cover - compiled
-    """out[b, z] = the plane, for each plane of the batch."""
-    depth, height, width = runs.shape
-    n_rows, length, above, left = layout(table, kx, height, width)
-    for task in numba.prange(TASKS):
-        buffer = np.empty(n_rows * length, table.dtype)
-        reached = np.empty(height, np.bool_)
-        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
-            plane = out[p // depth, p % depth]
-            if not sum_plane(p, runs, table, buffer, length, reached):
-                plane[:] = 0
-                continue
-            for y in range(height):
-                begin = (y + above) * length + left
-                for x in range(width):
-                    plane[y, x] = buffer[begin + x]
 
 
 @numba.njit(parallel=True, **COMPILED)
@@ -134,7 +116,7 @@ def _gather(runs, upstream, kx, tables):  # pragma: no cover - compiled
 
 @numba.njit(parallel=True, **COMPILED)
 def _pick(runs, table, kx, index, rows, out):  # pragma: no cover - compiled
-    """out[i] = the answer at voxel i; only planes with an occupied voxel are summed up."""
+    """out[i] = the response at voxel i; only planes with an occupied voxel are computed."""
     depth, height, width = runs.shape
     n_rows, length, above, left = layout(table, kx, height, width)
     for task in numba.prange(TASKS):
@@ -148,10 +130,3 @@ def _pick(runs, table, kx, index, rows, out):  # pragma: no cover - compiled
                 within = index[i] - (p % depth) * height * width
                 y = within // width
                 out[i] = buffer[(y + above) * length + left + within - y * width]
-
-
-def _plane_rows(occupancy: Occupancy) -> np.ndarray:
-    """(B * D + 1,) int64: the voxels of plane p are rows [p] to [p + 1] of ``index``."""
-    depth, height, width = occupancy.shape
-    starts = np.arange(len(occupancy) * depth + 1) * height * width
-    return np.searchsorted(occupancy.flat(), starts)

@@ -1,9 +1,9 @@
-"""The strongest answer in a voxel's section of a tower.
+"""The strongest response in the cross-section of a tower around a voxel.
 
-A kernel answers on the axis of a tower, and a tower is wider than its axis. So the answer for an
-occupied voxel is the strongest among the occupied voxels within a radius in plan and some way up.
-Taking a maximum moves with the scene and brings no two answers further apart: it is itself a GENEO
-(thesis 3.4), and so is what it makes of another.
+A kernel responds on the axis of a tower, and a tower is wider than its axis. An occupied voxel
+therefore takes the strongest response among the occupied voxels within a radius in plan and a
+height above it. A maximum is equivariant and does not increase differences, so it is a GENEO
+(thesis 3.4), and its composition with a GENEO is one too.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.compilation import COMPILED
 
 FLOOR_ROUNDING = 1e-6
-"""What a length may miss a whole number of voxels by."""
+"""Tolerance in voxels when a length is divided into whole voxels."""
 
 
 def whole_voxels(length: float, voxel_size: float) -> int:
-    """Voxels that fit into ``length`` m."""
+    """Number of voxels that fit into ``length`` m."""
     return int(length / voxel_size + FLOOR_ROUNDING)
 
 
 def section_offsets(radius: float, above: float, voxel_size: float) -> np.ndarray:
-    """(S, 3) int64 offsets (z, y, x) of the voxels of a section, itself first.
+    """(S, 3) int64 offsets (z, y, x) of the voxels of a cross-section, the voxel itself first.
 
     Args:
         radius: m, in plan.
-        above: m.
+        above: m, height above the voxel.
         voxel_size: m.
     """
     wide, high = whole_voxels(radius, voxel_size), whole_voxels(above, voxel_size)
@@ -41,14 +41,14 @@ def section_offsets(radius: float, above: float, voxel_size: float) -> np.ndarra
 
 
 def neighbours(occupancy: Occupancy, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The occupied voxels in the section of each.
+    """The occupied voxels in the cross-section of each occupied voxel.
 
     Args:
-        offsets: as ``section_offsets`` has them.
+        offsets: from ``section_offsets``.
 
     Returns:
-        starts (M + 1,) int64 and rows (N,) int32: those of voxel i are
-        ``rows[starts[i] : starts[i + 1]]``, itself first.
+        starts (M + 1,) int64 and rows (N,) int32: the cross-section of voxel i is
+        ``rows[starts[i] : starts[i + 1]]``, with i itself first.
     """
     starts = np.zeros(len(occupancy.index) + 1, np.int64)
     if len(occupancy.index) == 0:
@@ -61,13 +61,14 @@ def neighbours(occupancy: Occupancy, offsets: np.ndarray) -> tuple[np.ndarray, n
 
 
 @numba.njit(**COMPILED)
-def strongest(answers, starts, rows):  # pragma: no cover - compiled
-    """(M,) int32 row of the highest of ``answers`` (M,) in each section; the nearest of equals."""
-    out = np.empty(len(answers), np.int32)
-    for i in range(len(answers)):
+def strongest(responses, starts, rows):  # pragma: no cover - compiled
+    """(M,) int32 row of the highest of ``responses`` (M,) in each cross-section; of equal ones the
+    nearest."""
+    out = np.empty(len(responses), np.int32)
+    for i in range(len(responses)):
         best = rows[starts[i]]
         for k in range(starts[i] + 1, starts[i + 1]):
-            if answers[rows[k]] > answers[best]:
+            if responses[rows[k]] > responses[best]:
                 best = rows[k]
         out[i] = best
     return out

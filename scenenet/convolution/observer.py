@@ -1,10 +1,11 @@
-"""What follows the convolution, plane by plane while the plane is in the cache (thesis 4.3, 4.5).
+"""Probability, error and counts from the observer, plane by plane while the plane is in the cache
+(thesis 4.3, 4.5).
 
-The answer of the observer, H(x), goes through tanh and ReLU and then into a probability for every
-voxel, an error against the truth, or counts at every threshold. Only the first needs a volume; the
-other two leave nothing behind but a few numbers, and the gradient of the error with respect to the
-kernel is gathered from each plane before the next one takes its place. Rows that no occupied voxel
-reaches all hold the same value, (tanh(bias))_+, and are dealt with by their number.
+The response of the observer, H(x), passes through tanh and ReLU. The result is a probability for
+every voxel, an error against the labels, or counts at every threshold. Only the probabilities need
+a volume. The other two only keep a few numbers, and the gradient of the error with respect to the
+kernel is accumulated from each plane before the next one replaces it. In rows that no occupied
+voxel reaches every value is (tanh(bias))_+, so the row counts at once.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from scenenet.convolution.compiled.activation import activate
 from scenenet.convolution.compiled.kernel_tables import kernel_of, table_of
 from scenenet.convolution.compiled.options import TASKS, first_plane
 from scenenet.convolution.compiled.planes import gather_plane, layout, sum_plane
+from scenenet.convolution.compiled.volumes import activate_row, fill_volume
 from scenenet.convolution.convolve import convolution_gradient, table_shape
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.compilation import COMPILED
@@ -51,16 +53,16 @@ def squared_error(
 
     Args:
         occupancy, kernel, bias: as ``observe`` takes them.
-        tower: (T,) int64, ascending positions in (B, D, H, W) of the voxels whose target y is 1.
+        tower: (T,) int64, ascending flat positions in (B, D, H, W) of the voxels with y = 1.
         weights: f_w(0) and f_w(1).
 
     Returns:
         () of the kernel's dtype.
     """
     bias = kernel.new_zeros(()) if bias is None else bias
-    # Inside the function torch has switched gradients off, so it has to be told.
-    learns = torch.is_grad_enabled() and (kernel.requires_grad or bias.requires_grad)
-    return _SquaredError.apply(kernel, bias, occupancy, tower, weights, learns)
+    # Decided here, because torch disables gradients inside forward().
+    needs_gradient = torch.is_grad_enabled() and (kernel.requires_grad or bias.requires_grad)
+    return _SquaredError.apply(kernel, bias, occupancy, tower, weights, needs_gradient)
 
 
 def count_reached(
@@ -70,14 +72,15 @@ def count_reached(
     tower: np.ndarray,
     thresholds: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """How many voxels reach how many of the thresholds, without a volume.
+    """Numbers of voxels by how many thresholds they reach, without a volume.
 
     Args:
         occupancy, kernel, bias, tower: as ``squared_error`` takes them; no gradient.
         thresholds: (S,) ascending, all above zero; compared in the kernel's dtype.
 
     Returns:
-        (S + 1,) int64 counts of tower and of other voxels that reach i of the thresholds.
+        two arrays (S + 1,) int64: the numbers of tower voxels and of other voxels that reach
+        exactly i of the thresholds.
     """
     bias = kernel.new_zeros(()) if bias is None else bias
     weights = _numpy(kernel)
@@ -90,7 +93,7 @@ def count_reached(
         weights.shape[2],
         _scalar(bias),
         tower,
-        _plane_starts(tower, occupancy),
+        occupancy.plane_rows(tower),
         taus,
         len(taus) / span,
         counts,
@@ -104,7 +107,8 @@ class _Observation(torch.autograd.Function):
     def forward(ctx, kernel: Tensor, bias: Tensor, occupancy: Occupancy) -> Tensor:
         weights = _numpy(kernel)
         out = np.empty((len(occupancy), *occupancy.shape), weights.dtype)
-        _observe(occupancy.runs, table_of(weights), weights.shape[2], _scalar(bias), out)
+        table = table_of(weights)
+        fill_volume(occupancy.runs, table, weights.shape[2], _scalar(bias), True, out)
         probability = torch.from_numpy(out)
         ctx.occupancy, ctx.size = occupancy, tuple(kernel.shape)
         ctx.save_for_backward(probability)
@@ -118,7 +122,7 @@ class _Observation(torch.autograd.Function):
 
 
 class _SquaredError(torch.autograd.Function):
-    """The gradient is gathered on the way forward, as the planes are not kept."""
+    """The gradient is accumulated in the forward pass, because the planes are not kept."""
 
     @staticmethod
     def forward(
@@ -128,11 +132,12 @@ class _SquaredError(torch.autograd.Function):
         occupancy: Occupancy,
         tower: np.ndarray,
         weights: tuple[float, float],
-        learns: bool,
+        needs_gradient: bool,
     ) -> Tensor:
         array = _numpy(kernel)
         size = array.shape
-        tables = np.zeros((TASKS, *(table_shape(size) if learns else (0, 0, 0, 0))), array.dtype)
+        shape = table_shape(size) if needs_gradient else (0, 0, 0, 0)
+        tables = np.zeros((TASKS, *shape), array.dtype)
         sums = np.zeros((TASKS, 2))
         _score(
             occupancy.runs,
@@ -140,14 +145,14 @@ class _SquaredError(torch.autograd.Function):
             size[2],
             _scalar(bias),
             tower,
-            _plane_starts(tower, occupancy),
+            occupancy.plane_rows(tower),
             np.array(weights, array.dtype),
-            learns,
+            needs_gradient,
             tables,
             sums,
         )
         error, by_bias = sums.sum(axis=0)
-        if learns:
+        if needs_gradient:
             by_kernel = torch.from_numpy(kernel_of(tables, size[2]))
             ctx.save_for_backward(by_kernel, torch.tensor(by_bias, dtype=bias.dtype))
         return torch.tensor(error, dtype=kernel.dtype)
@@ -159,29 +164,10 @@ class _SquaredError(torch.autograd.Function):
 
 
 @numba.njit(parallel=True, **COMPILED)
-def _observe(runs, table, kx, bias, out):  # pragma: no cover - compiled
-    """out[b, z] = the probabilities of the plane, for each plane of the batch."""
-    depth, height, width = runs.shape
-    n_rows, length, above, left = layout(table, kx, height, width)
-    for task in numba.prange(TASKS):
-        buffer = np.empty(n_rows * length, table.dtype)
-        reached = np.empty(height, np.bool_)
-        for p in range(first_plane(task), len(runs.planes) - 1, TASKS):
-            plane = out[p // depth, p % depth]
-            sum_plane(p, runs, table, buffer, length, reached)
-            for y in range(height):
-                if reached[y]:
-                    begin = (y + above) * length + left
-                    _squash_row(buffer[begin : begin + width], bias, plane[y])
-                else:
-                    plane[y] = activate(bias)
-
-
-@numba.njit(parallel=True, **COMPILED)
 def _score(
-    runs, table, kx, bias, tower, starts, weights, learns, tables, sums
+    runs, table, kx, bias, tower, starts, weights, needs_gradient, tables, sums
 ):  # pragma: no cover - compiled
-    """sums[task] += (error, its derivative by the bias), tables[task] += that by the table."""
+    """sums[task] += error and its derivative by the bias; tables[task] += that by the table."""
     _, height, width = runs.shape
     n_rows, length, above, left = layout(table, kx, height, width)
     two = table.dtype.type(2)
@@ -200,7 +186,7 @@ def _score(
                 begin = (y + above) * length + left
                 row, slopes = buffer[begin : begin + width], slope[begin : begin + width]
                 if reached[y]:
-                    _squash_in_place(row, bias)
+                    _activate_in_place(row, bias)
                     _slope_row(row, two * empty, slopes)
                     error += empty * _sum_of_squares(row)
                     by_bias += _sum(slopes)
@@ -216,11 +202,11 @@ def _score(
                 found = buffer[at]
                 missing = one - found
                 error += at_tower * missing * missing - empty * found * found
-                # Behind the ReLU there is no slope, however wrong the answer is.
+                # The ReLU has no slope where the response is not positive, however large the error.
                 steep = -two * at_tower * missing * (one - found * found) if found > 0 else found
                 by_bias += steep - slope[at]
                 slope[at] = steep
-            if learns and occupied:
+            if needs_gradient and occupied:
                 gather_plane(p, runs, slope, length, tables[task])
         sums[task, 0], sums[task, 1] = error, by_bias
 
@@ -245,10 +231,10 @@ def _count(
                     steps[y] = beyond
                     counts[task, 0, beyond] += width
                     continue
-                answers = buffer[(y + above) * length + left :]
-                _squash_row(answers, bias, row)
+                responses = buffer[(y + above) * length + left :]
+                activate_row(responses, bias, row)
                 for x in range(width):
-                    step = _reached(row[x], answers[x] + bias, thresholds, density)
+                    step = _reached(row[x], responses[x] + bias, thresholds, density)
                     steps[y, x] = step
                     counts[task, 0, step] += 1
             for i in range(starts[p], starts[p + 1]):
@@ -259,15 +245,15 @@ def _count(
 
 
 @numba.njit(**COMPILED)
-def _reached(probability, answer, thresholds, density):  # pragma: no cover - compiled
-    """How many thresholds a probability reaches; what is not a number reaches none.
+def _reached(probability, response, thresholds, density):  # pragma: no cover - compiled
+    """How many thresholds a probability reaches; NaN reaches none.
 
-    The thresholds are about ``density`` to a unit of the answer before tanh, which says where among
-    them to look; where exactly, the comparison with the probability does.
+    There are about ``density`` thresholds per unit of the response before tanh, which gives a first
+    estimate; comparisons with the probability then correct it.
     """
     if not probability >= thresholds[0]:
         return 0
-    step = min(len(thresholds), max(1, int(min(answer, 1e6) * density)))
+    step = min(len(thresholds), max(1, int(min(response, 1e6) * density)))
     while step < len(thresholds) and probability >= thresholds[step]:
         step += 1
     while probability < thresholds[step - 1]:
@@ -276,20 +262,14 @@ def _reached(probability, answer, thresholds, density):  # pragma: no cover - co
 
 
 @numba.njit(**COMPILED)
-def _squash_in_place(row, bias):  # pragma: no cover - compiled
+def _activate_in_place(row, bias):  # pragma: no cover - compiled
     for x in range(len(row)):
         row[x] = activate(row[x] + bias)
 
 
 @numba.njit(**COMPILED)
-def _squash_row(answers, bias, out):  # pragma: no cover - compiled
-    for x in range(len(out)):
-        out[x] = activate(answers[x] + bias)
-
-
-@numba.njit(**COMPILED)
 def _slope_row(probabilities, factor, out):  # pragma: no cover - compiled
-    """out = derivative of factor / 2 p^2 before tanh; ReLU's is in p, which is 0 there."""
+    """out = derivative of factor / 2 p^2 with respect to the response; 0 where p is 0 (ReLU)."""
     one = probabilities.dtype.type(1)
     for x in range(len(out)):
         p = probabilities[x]
@@ -297,7 +277,7 @@ def _slope_row(probabilities, factor, out):  # pragma: no cover - compiled
 
 
 REDUCED = COMPILED | {"fastmath": {"contract", "reassoc"}}
-"""Sums over a row may be taken lane by lane; the order is the compiler's, and always the same."""
+"""The compiler may sum a row lane by lane; the order it chooses is always the same."""
 
 
 @numba.njit(**REDUCED)
@@ -314,12 +294,6 @@ def _sum(row):  # pragma: no cover - compiled
     for x in range(len(row)):
         total += row[x]
     return np.float64(total)
-
-
-def _plane_starts(tower: np.ndarray, occupancy: Occupancy) -> np.ndarray:
-    """(B * D + 1,) int64: the tower voxels of plane p are entries [p] to [p + 1]."""
-    depth, height, width = occupancy.shape
-    return np.searchsorted(tower, np.arange(len(occupancy) * depth + 1) * height * width)
 
 
 def _numpy(tensor: Tensor) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The occupied voxels of a batch of grids, as the convolution reads them (thesis 4.2)."""
+"""The occupied voxels of a batch of grids, the input of the convolution (thesis 4.2)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Occupancy:
     Attributes:
         index: (M,) int64, flat C-order positions in (D, H, W) of the occupied voxels of all grids,
             one grid after the other, ascending within a grid.
-        values: (M,) floats, the measurement phi there (thesis 4.2.2); None where all are one.
+        values: (M,) floats, the measurement phi there (thesis 4.2.2); None if all are one.
         offsets: (B + 1,) int64, grid b holds rows offsets[b] to offsets[b + 1].
         shape: (D, H, W) of every grid: axes z, y, x.
     """
@@ -51,12 +51,12 @@ class Occupancy:
         """Gather grids given by flat C-order indices (M_b,) and their values (M_b,).
 
         Args:
-            indices: ascending and without duplicates, each.
-            values: None where all are one.
+            indices: each ascending and without duplicates.
+            values: None if all are one.
             shape: (D, H, W) of every grid.
 
         Raises:
-            ValueError: an index is out of order, comes twice or lies outside the grid.
+            ValueError: an index is out of order, duplicate or outside the grid.
         """
         offsets = np.zeros(len(indices) + 1, np.int64)
         np.cumsum([len(index) for index in indices], out=offsets[1:])
@@ -71,12 +71,12 @@ class Occupancy:
 
     @property
     def n_voxels(self) -> int:
-        """Voxels of all grids, empty ones included."""
+        """Number of voxels of all grids, empty ones included."""
         return len(self) * int(np.prod(self.shape))
 
     @cached_property
     def runs(self) -> Runs:
-        """The same voxels, as the loops take them."""
+        """The same voxels in the form that the compiled loops take."""
         return runs_of(self.index, self.values, self.offsets, self.shape)
 
     def flat(self) -> np.ndarray:
@@ -84,8 +84,14 @@ class Occupancy:
         grid = np.repeat(np.arange(len(self)), np.diff(self.offsets))
         return self.index + grid * int(np.prod(self.shape))
 
+    def plane_rows(self, flat: np.ndarray) -> np.ndarray:
+        """(B * D + 1,) int64: ascending positions ``flat`` (N,) in (B, D, H, W) have their rows
+        [p] to [p + 1] in plane p."""
+        depth, height, width = self.shape
+        return np.searchsorted(flat, np.arange(len(self) * depth + 1) * height * width)
+
     def dense(self, dtype: torch.dtype | None = None) -> Tensor:
-        """(B, D, H, W) tensor of the same grids, of the values' type if ``dtype`` is None."""
+        """(B, D, H, W) tensor of the grids, of the type of the values if ``dtype`` is None."""
         values = np.ones(len(self.index), np.float32) if self.values is None else self.values
         entries = torch.from_numpy(values).to(dtype)
         volume = torch.zeros(self.n_voxels, dtype=entries.dtype)

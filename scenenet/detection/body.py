@@ -1,6 +1,6 @@
-"""What stands on an axis: its foot, its height, whether it goes all the way, and its middle.
+"""Measures the body on an axis: foot, height, continuity and centre.
 
-Measured in the occupied voxels. Places are (M, 3) m, middles of voxels of one lattice.
+All positions are centres of occupied voxels on one lattice, (M, 3) m.
 """
 
 from __future__ import annotations
@@ -10,34 +10,34 @@ from dataclasses import dataclass
 import numpy as np
 
 SLIM = 1 / 8
-"""Half the width of a body as a part of its height, at most; twice that for its legs."""
+"""Largest half width of a body as a share of its height; legs may be twice as wide."""
 
 SLIM_M = 2.0
-"""m; but the body of a low tower is looked for this far from the axis, which is known to a voxel or
-two."""
+"""m, smallest search radius for a body, because the axis is only known to a voxel or two."""
 
 TOP_GAP = 3.0
-"""m of nothing that end a tower upwards: a bird above it is not its top."""
+"""m, a gap that ends a tower upwards, so that a bird above it is not its top."""
 
 STRAY_GAP = 10.0
-"""m between detected voxels that end it too: a stray return high above can look like a pole."""
+"""m, a gap between detected voxels that ends it too, because a stray return high above can look
+like a pole."""
 
 MIDDLE = 0.3, 0.9
-"""Parts of the height between which a body stands free: below are shrubs and its legs."""
+"""Shares of the height between which the body is measured: below are shrubs and its legs."""
 
-LOOKS = 2.0, 1.5, 1.0
-"""Radii, as multiples of the slim one, at which the middle is looked for one after the other: a
-model that saw a leg or a crossarm put the axis beside it."""
+SEARCH_RADII = 2.0, 1.5, 1.0
+"""Successive search radii for the centre, in multiples of the slim radius. The axis may start on a
+leg or a crossarm."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """What stands on an axis.
+    """The body on an axis.
 
     Attributes:
         base: m, elevation of the ground at its foot.
-        height: m, from there to its top.
-        upright: share of the levels in between at which something stands.
+        height: m, from the base to its top.
+        upright: share of the levels from foot to top with an occupied voxel.
     """
 
     base: float
@@ -45,55 +45,57 @@ class Body:
     upright: float
 
 
-def standing(
+def measure_body(
     around: np.ndarray,
     axis: np.ndarray,
-    seen: np.ndarray,
+    elevations: np.ndarray,
     foot_radius: float,
     voxel_size: float,
 ) -> Body:
-    """Measure what stands on an axis (2,) m.
+    """The body on an axis (2,) m.
 
     Args:
         around: (M, 3) m, occupied voxels.
-        seen: (N,) m, elevations of its detected voxels, at least one.
-        foot_radius: m, where the ground is looked for.
+        elevations: (N,) m, of its detected voxels, at least one.
+        foot_radius: m, radius in which the ground is measured.
+        voxel_size: m.
     """
     distance = np.hypot(around[:, 0] - axis[0], around[:, 1] - axis[1])
-    elevations = np.append(around[distance <= foot_radius, 2], seen.min())
-    # Not the lowest: a return from below the ground must not make a tower of a bush.
-    lowest = float(np.percentile(elevations, 5))
-    detected = np.unique(np.rint((seen - seen.min()) / voxel_size).astype(int))
-    midst = int((np.median(seen) - seen.min()) / voxel_size)
-    head = _unbroken(detected, midst, STRAY_GAP / voxel_size)
-    height = seen.min() + head * voxel_size - lowest
+    lowest_seen = elevations.min()
+    near_foot = np.append(around[distance <= foot_radius, 2], lowest_seen)
+    # A percentile, because a single return below the ground would make a bush as tall as a tower.
+    lowest = float(np.percentile(near_foot, 5))
+    detected = np.unique(np.rint((elevations - lowest_seen) / voxel_size).astype(int))
+    middle = int((np.median(elevations) - lowest_seen) / voxel_size)
+    head = _unbroken(detected, middle, STRAY_GAP / voxel_size)
+    height = lowest_seen + head * voxel_size - lowest
     slim = max(SLIM_M, SLIM * height)
     legs = around[:, 2] - lowest < MIDDLE[0] * height
     near = distance <= np.where(legs, 2 * slim, slim)
-    # Levels are counted from the lowest one that is surely on the lattice.
-    levels = np.unique(np.rint((around[near, 2] - seen.min()) / voxel_size).astype(int))
-    foot = round((lowest - seen.min()) / voxel_size)
-    top = _unbroken(np.union1d(levels, detected[detected <= head]), midst, TOP_GAP / voxel_size)
+    # Levels count from the lowest detected voxel, which is on the lattice.
+    levels = np.unique(np.rint((around[near, 2] - lowest_seen) / voxel_size).astype(int))
+    foot = round((lowest - lowest_seen) / voxel_size)
+    top = _unbroken(np.union1d(levels, detected[detected <= head]), middle, TOP_GAP / voxel_size)
     upright = ((levels >= foot) & (levels <= top)).sum() / (top - foot + 1)
     base = lowest - voxel_size / 2
-    return Body(base, float(seen.min() + (top + 0.5) * voxel_size - base), float(upright))
+    return Body(base, float(lowest_seen + (top + 0.5) * voxel_size - base), float(upright))
 
 
 def _unbroken(levels: np.ndarray, start: int, gap: float) -> int:
-    """The last of ascending levels (N,) that is reached from ``start`` without a wider ``gap``."""
+    """The highest of ascending levels (N,) above ``start`` before a gap wider than ``gap``."""
     above = np.append(start, levels[levels > start])
     breaks = np.flatnonzero(np.diff(above) > gap)
     return int(above[breaks[0]] if len(breaks) else above[-1])
 
 
-def middle(
+def centre_body(
     around: np.ndarray, axis: np.ndarray, body: Body, voxel_size: float
 ) -> tuple[np.ndarray, float, float]:
-    """Axis (2,) m in the middle of a body, its width in m, and the share of it that stands free.
+    """Axis (2,) m through the centre of a body, its width in m, and the share that stands free.
 
-    Level by level, what hangs together there and comes near the axis is the body, as long as it is
-    slim. Where it is not, a wire, a tree or a building touches it. Where that is so at all levels,
-    nothing stands free: the axis stays where it is and the width is NaN.
+    At each level the body consists of the connected voxels near the axis. A level stands free if
+    they are slim; otherwise a conductor, a tree or a building touches the body. If no level stands
+    free, the axis does not change and the width is NaN.
     """
     from scipy.ndimage import label
 
@@ -111,17 +113,17 @@ def middle(
     within_level = np.zeros((3, 3, 3))
     within_level[:, :, 1] = 1
     piece = label(volume, within_level)[0][tuple(steps.T)]
-    for look in LOOKS:
-        near = np.hypot(places[:, 0] - at[0], places[:, 1] - at[1]) <= look * slim
-        mine = np.isin(piece, np.unique(piece[near]))
-        middles, widths = [], []
-        for level in np.unique(steps[mine, 2]):
-            found = places[mine & (steps[:, 2] == level), :2]
+    for multiple in SEARCH_RADII:
+        near = np.hypot(places[:, 0] - at[0], places[:, 1] - at[1]) <= multiple * slim
+        in_body = np.isin(piece, np.unique(piece[near]))
+        centres, widths = [], []
+        for level in np.unique(steps[in_body, 2]):
+            found = places[in_body & (steps[:, 2] == level), :2]
             size = np.ptp(found, axis=0) + voxel_size
             if size.max() <= 2 * slim + voxel_size:
-                middles.append((found.min(axis=0) + found.max(axis=0)) / 2)
+                centres.append((found.min(axis=0) + found.max(axis=0)) / 2)
                 widths.append(size.max())
-        if middles:
-            at, width = np.median(middles, axis=0), float(np.median(widths))
-            free = len(middles) / len(np.unique(steps[mine, 2]))
+        if centres:
+            at, width = np.median(centres, axis=0), float(np.median(widths))
+            free = len(centres) / len(np.unique(steps[in_body, 2]))
     return axis + at, width, free

@@ -1,8 +1,8 @@
-"""Wires that leave a place: what tells a tower from everything else that is tall.
+"""Conductors that leave a tower, which distinguish it from other tall objects.
 
-A conductor is long, thin and nearly level, it hangs in free air and it leads away from the head of
-what carries it. All of this can be seen in the occupied voxels, without a label: a treetop stands
-on its tree, a roof is as wide as it is long, a street light has nothing to hang on to.
+A conductor is long, thin and nearly level, hangs in free air and leads away from the head of the
+tower that carries it. The occupied voxels show all of this without labels: a treetop has its tree
+below, a roof is as wide as it is long, and no conductor leaves a street light.
 """
 
 from __future__ import annotations
@@ -13,58 +13,58 @@ from dataclasses import dataclass
 import numpy as np
 
 HEAD = 0.6
-"""Part of the height above which conductors are looked for: below are the ground, shrubs and the
-body, and of several levels of conductors at least one hangs in the upper two fifths."""
+"""Share of the height above which conductors are searched. Ground, shrubs and the body are below,
+and of several levels of conductors at least one is in the upper two fifths."""
 
 FREE_AIR = 3.0
-"""m under a conductor in which there is nothing: about what is kept clear between it and trees."""
+"""m of empty space below a conductor, about the clearance that is kept from trees."""
 
-FREE_AIR_PART = 1 / 8
-"""The same as a part of the height. Conductors one above the other keep such a distance; the
-storeys of a building, three to four metres, do not."""
+FREE_AIR_SHARE = 1 / 8
+"""The same as a share of the height. The levels of conductors are this far apart; the storeys of a
+building, three to four metres, are not."""
 
 NEAR, FAR = 3.0, 20.0
-"""m from the axis between which conductors are looked for: beyond the body, and as far as the crop
+"""m from the axis between which conductors are searched: outside the body, and as far as the crop
 of a tower reaches."""
 
 RISE = 0.5
-"""Steepest conductor, m a metre: at the head of a tower on a slope it is a third."""
+"""Steepest slope of a conductor; at the head of a tower on a slope it is about a third."""
 
 SCALES = 2.0, 4.0, 8.0
-"""m, radii of the neighbourhoods that are called long and thin or not. A small one sees a single
-conductor; conductors one to three metres apart look like one ribbon to a large one. With three
-radii there is one for any distance between them."""
+"""m, radii of the neighbourhoods in which shape is measured. A small neighbourhood shows a single
+conductor; in a large one, conductors one to three metres apart look like one ribbon. Three radii
+cover all distances between conductors."""
 
 THIN = 0.25
-"""Largest variance across a conductor, or a ribbon of them, as a part of the variance along it. The
-edge of a half plane, that is of a roof, has 0.28."""
+"""Largest variance across a conductor, or a ribbon of conductors, as a share of the variance along
+it. The edge of a half plane, such as a roof, has 0.28."""
 
 MIN_VOXELS = 5
-"""A direction is not measured on fewer voxels."""
+"""Smallest number of voxels for which a direction is measured."""
 
 SECTOR = 15.0
-"""Degrees by which bearings of one span differ: voxels are coarse, and conductors spread out from
-the head to the crossarms of the next tower."""
+"""Largest difference in degrees between the bearings within a span: voxels are coarse, and
+conductors diverge from the head to the crossarms of the next tower."""
 
-APART = 45.0
-"""Degrees between two spans; a line turns less sharply than it doubles back."""
+MIN_ANGLE = 45.0
+"""Smallest angle in degrees between two spans; a line never turns back on itself."""
 
 GAP = 2.0
-"""m along a conductor in which a scanner may have missed it."""
+"""m, largest gap along a conductor that a scanner may have missed."""
 
-SHORTEST = 7.0
-"""m; rows of treetops are seldom longer."""
+MIN_LENGTH = 7.0
+"""m, shortest span; rows of treetops are seldom longer."""
 
 
 @dataclass(frozen=True)
 class Span:
-    """Wires that leave in one direction.
+    """Conductors that leave in one direction.
 
     Attributes:
         bearing: degrees from north (+y), clockwise.
-        length: m along which they are seen without a gap, between ``NEAR`` and ``FAR``.
-        followed: that length as a part of the way from ``NEAR`` to ``FAR``, or to where the data
-            end in this direction.
+        length: m, longest stretch between ``NEAR`` and ``FAR`` without a gap.
+        followed: that length as a share of the distance from ``NEAR`` to ``FAR``, or to the edge of
+            the data in this direction.
     """
 
     bearing: float
@@ -80,14 +80,14 @@ def leaving_spans(
     crossarm: float,
     voxel_size: float,
 ) -> list[Span]:
-    """Directions in which wires leave a tower, the longest first.
+    """Directions in which conductors leave a tower, the longest first.
 
     Args:
-        surroundings: (M, 3) m, middles of the occupied voxels, at least those within
-            ``FAR + max(SCALES)`` of the axis in plan. They must lie on one lattice.
+        surroundings: (M, 3) m, centres of the occupied voxels, at least those within
+            ``FAR + max(SCALES)`` of the axis in plan. They must be on one lattice.
         axis: m, x and y of the tower.
         base, height: m, elevation of its foot and height above it.
-        crossarm: m, how far beside the axis a conductor may hang.
+        crossarm: m, largest distance at which a conductor passes the axis.
         voxel_size: m.
     """
     relative = surroundings - np.array([*axis, base])
@@ -99,15 +99,16 @@ def leaving_spans(
     at_head = (near[:, 2] >= HEAD * height) & (near[:, 2] <= height + RISE * distance)
     if at_head.sum() < MIN_VOXELS:
         return []
-    free_air = max(FREE_AIR, FREE_AIR_PART * height)
+    free_air = max(FREE_AIR, FREE_AIR_SHARE * height)
     hanging = near[at_head & _hangs(near, voxel_size, free_air)]
     if len(hanging) < MIN_VOXELS:
         return []
     off_axis = np.hypot(hanging[:, 0], hanging[:, 1])
-    # The way along a conductor is at most the distance, and less than it by the offset.
-    asked = (off_axis >= NEAR) & (off_axis <= np.hypot(FAR, crossarm))
-    place, heading = _thin(hanging, asked)
-    # Pointing away from the tower, along s; t is the distance at which it passes the axis.
+    # A conductor may pass the axis at up to ``crossarm``, so FAR along it can be further away.
+    candidate = (off_axis >= NEAR) & (off_axis <= np.hypot(FAR, crossarm))
+    place, heading = _thin(hanging, candidate)
+    # s is the distance along the conductor, t the distance at which it passes the axis. The heading
+    # points away from the tower.
     s = np.einsum("ni,ni->n", place[:, :2], heading)
     heading = np.where(s[:, None] < 0, -heading, heading)
     s = np.abs(s)
@@ -116,17 +117,17 @@ def leaving_spans(
     towards = _bearing(near)
     spans = []
     for bearing, length in _runs(_bearing(heading[leaves]), s[leaves]):
-        end = distance[_turn(towards, bearing) <= SECTOR].max(initial=NEAR)
-        way = max(min(float(end), FAR) - NEAR, SHORTEST)
-        spans.append(Span(bearing, length, min(1.0, length / way)))
+        end = distance[_angle(towards, bearing) <= SECTOR].max(initial=NEAR)
+        available = max(min(float(end), FAR) - NEAR, MIN_LENGTH)
+        spans.append(Span(bearing, length, min(1.0, length / available)))
     return spans
 
 
 def _hangs(places: np.ndarray, voxel_size: float, free_air: float) -> np.ndarray:
-    """(M,) whether the next voxel of the same column below is further away than ``free_air``.
+    """(M,) bool, whether the next occupied voxel below is more than ``free_air`` m away.
 
-    Two voxels on top of one another count as one, because a wire that crosses from one to the
-    other fills both.
+    Two adjacent voxels of a column count as one, because a conductor that passes from one to the
+    other occupies both.
     """
     steps = np.rint((places - places.min(axis=0)) / voxel_size).astype(np.int64)
     order = np.lexsort((steps[:, 2], steps[:, 1], steps[:, 0]))
@@ -142,11 +143,15 @@ def _hangs(places: np.ndarray, voxel_size: float, free_air: float) -> np.ndarray
     return hangs
 
 
-def _thin(places: np.ndarray, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Those of (M, 3) m that are ``asked`` (M,) for and lie on something long, thin and level.
+def _thin(places: np.ndarray, candidate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The candidates that are part of something long, thin and level.
+
+    Args:
+        places: (M, 3) m.
+        candidate: (M,) bool.
 
     Returns:
-        (N, 3) m and their headings (N, 2), horizontal and of length one.
+        positions (N, 3) m, and horizontal unit vectors (N, 2) along the conductors.
     """
     from scipy.spatial import cKDTree
 
@@ -160,7 +165,7 @@ def _thin(places: np.ndarray, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray
         pair = square <= radius**2
         i, j, d = one[pair], other[pair], offset[pair]
         count = 1 + np.bincount(i, minlength=n) + np.bincount(j, minlength=n)
-        rows = np.flatnonzero(asked & (count >= MIN_VOXELS))
+        rows = np.flatnonzero(candidate & (count >= MIN_VOXELS))
         mean = np.stack([np.bincount(i, x, n) - np.bincount(j, x, n) for x in d.T], axis=1)
         mean = (mean / count[:, None])[rows]
         spread = np.empty((len(rows), 3, 3))
@@ -172,7 +177,7 @@ def _thin(places: np.ndarray, asked: np.ndarray) -> tuple[np.ndarray, np.ndarray
                 spread[:, b, a] = spread[:, a, b]
         variance, direction = np.linalg.eigh(spread)
         along = direction[:, :, 2]
-        # A line of length l has the variance l^2 / 12; it must fill half of the sphere's diameter.
+        # A line of length l has the variance l^2 / 12; it must cover half the sphere's diameter.
         long = variance[:, 2] * 12 >= radius**2
         level = np.abs(along[:, 2]) <= RISE
         share = variance[:, 1] / np.maximum(variance[:, 2], 1e-9)
@@ -187,36 +192,36 @@ def _runs(bearing: np.ndarray, s: np.ndarray) -> Iterator[tuple[float, float]]:
     """Bearing in degrees and length in m of each span, the longest first.
 
     Args:
-        bearing: (M,) degrees, of places on conductors.
-        s: (M,) m from the axis.
+        bearing: (M,) degrees, of voxels on conductors.
+        s: (M,) m, their distances along the conductors.
     """
     while len(bearing):
         runs = []
         for middle in np.arange(0.0, 360.0, SECTOR / 3):
-            mine = _turn(bearing, middle) <= SECTOR
-            runs.append((_longest_run(s[mine]), int(mine.sum()), -middle))
+            inside = _angle(bearing, middle) <= SECTOR
+            runs.append((_longest_run(s[inside]), int(inside.sum()), -middle))
         length, _, negative = max(runs)
-        if length < SHORTEST:
+        if length < MIN_LENGTH:
             return
-        turned = _turn(bearing, -negative)
-        radians = np.radians(bearing[turned <= SECTOR])
+        angle = _angle(bearing, -negative)
+        radians = np.radians(bearing[angle <= SECTOR])
         mean = np.degrees(np.arctan2(np.sin(radians).mean(), np.cos(radians).mean())) % 360
         yield float(mean), length
-        bearing, s = bearing[turned > APART], s[turned > APART]
+        bearing, s = bearing[angle > MIN_ANGLE], s[angle > MIN_ANGLE]
 
 
 def _bearing(vectors: np.ndarray) -> np.ndarray:
-    """(M,) degrees from +y, clockwise, of (M, 2 or more)."""
+    """(M,) degrees from +y, clockwise, of vectors (M, 2 or more)."""
     return np.degrees(np.arctan2(vectors[:, 0], vectors[:, 1])) % 360
 
 
-def _turn(bearing: np.ndarray, middle: float) -> np.ndarray:
-    """Degrees between bearings (M,) and one of them, at most 180."""
+def _angle(bearing: np.ndarray, middle: float) -> np.ndarray:
+    """Degrees in [0, 180] between bearings (M,) and ``middle``."""
     return np.abs((bearing - middle + 180) % 360 - 180)
 
 
 def _longest_run(s: np.ndarray) -> float:
-    """m, longest stretch of the positions (M,) m that has no gap over ``GAP``."""
+    """m, longest stretch of the positions (M,) m without a gap over ``GAP``."""
     if len(s) == 0:
         return 0.0
     metres = np.unique(s.astype(int))

@@ -32,8 +32,8 @@ class DetectionSettings(Settings):
     min_body: float = Field(
         3.0,
         ge=0,
-        description="m from the lowest to the highest of them, a third of the lowest tower: a "
-        "tower is detected along its body, a treetop or a roof at one place",
+        description="m from the lowest to the highest of these voxels, a third of the lowest "
+        "tower: a tower is detected along its body, a treetop or a roof at one height",
     )
     min_height: float = Field(
         9.0, ge=0, description="m; thesis 5.1.2 has towers from 18 m, wooden poles start at 9 m"
@@ -46,40 +46,40 @@ class DetectionSettings(Settings):
         ge=0,
         le=1,
         description="smallest share of the levels from foot to top with an occupied voxel: the "
-        "body of a tower reaches the ground, conductors above one another do not",
+        "body of a tower reaches the ground; conductors above one another do not",
     )
     crossarm: float = Field(
         0.25,
         gt=0,
         le=1,
-        description="of the height; largest distance of a conductor from the axis",
+        description="largest distance of a conductor from the axis, as a share of the height",
     )
     min_conductor: float = Field(
         0.75,
         ge=0,
-        description="length of conductor that leaves the head, all directions together, as a "
-        "share of the stretch from 3 to 20 m off the axis, or to the edge of the data; 0 accepts "
-        "towers without conductors. Trees, cranes, lone poles and roofs have none. Twice as much "
-        "is needed below tau",
+        description="smallest length of conductors that leave the head, all directions together, "
+        "as a share of the distance from 3 to 20 m from the axis, or to the edge of the data. 0 "
+        "accepts towers without conductors. Trees, cranes, lone poles and roofs have none. Below "
+        "tau twice this length is needed",
     )
     min_free: float = Field(
         0.5,
         ge=0,
         le=1,
-        description="smallest share of the body that nothing touches, below tau: a tree under a "
-        "line has its crown",
+        description="smallest share of the body that nothing touches, for towers below tau: it "
+        "excludes trees under a line, whose crowns are wide",
     )
     body: float = Field(
         2.1,
         gt=0,
-        description="m about the axis, half the mean width of a tower (thesis 5.1.2): every "
+        description="m around the axis, half the mean width of a tower (thesis 5.1.2): every "
         "occupied voxel there belongs to the tower, detected or not",
     )
     beside_body: float = Field(
-        1.0, ge=0, description="m added to half the measured width, for a wider tower"
+        1.0, ge=0, description="m added to half the measured width of a wider tower"
     )
     foot: float = Field(
-        1.0, ge=0, description="m above the ground; voxels below are ground and plants"
+        1.0, ge=0, description="m above the ground; voxels below this are ground and plants"
     )
 
     @model_validator(mode="before")

@@ -1,7 +1,7 @@
-"""The tower list of a survey: the one declaration of its columns.
+"""The tower list of a survey, with the only declaration of its columns.
 
 The GeoJSON, the tables of the report and the reference page all follow from the fields of
-``SurveyTower``. A new column is a new field here, and the code that measures it
+``SurveyTower``. A new column needs a new field here and the code that measures it
 (``scenenet.prediction.tile_predictions``).
 """
 
@@ -44,12 +44,11 @@ class SurveyTower:
     )
     width: float = _column("m", "width of its body where nothing touches it", heading="width")
     conductor_directions: int = _column(
-        "", "number of directions in which conductors leave it", heading="conductor directions",
-        name="wire_directions",
-    )  # fmt: skip
+        "", "number of directions in which conductors leave it", heading="conductor directions"
+    )
     conductor_bearings: tuple[float, ...] = _column(
         "degrees", "bearing of each of these directions, clockwise from north, the longest span "
-        "first", name="wire_bearings",
+        "first",
     )  # fmt: skip
     probability: float = _column("1", "highest probability of its voxels", heading="probability")
     points: int = _column(

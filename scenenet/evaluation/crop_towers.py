@@ -1,4 +1,4 @@
-"""Detection of towers in a crop, and matching with the labelled ones."""
+"""Detection of towers in a crop, and matching with the labelled towers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from scenenet.convolution.coarsening import block_edge, coarsened
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.dataset.crops import Crop
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample
-from scenenet.detection.detect import DetectedTower, among, body_voxels, detect_towers
+from scenenet.detection.detect import DetectedTower, body_voxels, detect_towers, surroundings_in
 from scenenet.detection.settings import DetectionSettings
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 
@@ -22,7 +22,7 @@ class CropDetection:
 
     Attributes:
         towers: highest probability first.
-        voxels: (M,) bool, which occupied voxels of the crop belong to one of them.
+        voxels: (M,) bool, which occupied voxels of the crop belong to a detected tower.
     """
 
     towers: list[DetectedTower]
@@ -36,20 +36,21 @@ def detect_in_crop(
 
     Args:
         probability: (V,) of every voxel of the sample's grid.
+        tau: threshold of the model.
     """
-    # Only occupied voxels: a tower is made of points.
     of_occupied = probability[sample.index]
     size = sample.grid.voxel_size
     edge = block_edge(size)
-    # Towers are measured in blocks of about a metre: finer voxels have gaps where points are few.
+    # Towers are measured in blocks of about a metre, because fine voxels have gaps between points.
     blocks, block = coarsened(Occupancy.of_grids([sample.index], None, sample.grid.shape), edge)
     coarse = VoxelGrid(sample.grid.origin, size * edge, blocks.shape)
     highest = np.zeros(len(blocks.index), of_occupied.dtype)
     np.maximum.at(highest, block, of_occupied)
     detected = np.flatnonzero(highest >= detection.threshold(tau))
     places = coarse.centres(blocks.index)
+    around = surroundings_in(places)
     towers = detect_towers(
-        places[detected], highest[detected], among(places), coarse.voxel_size, tau, detection
+        places[detected], highest[detected], around, coarse.voxel_size, tau, detection
     )
     centres = sample.grid.centres(sample.index)
     of_a_tower = np.zeros(len(centres), bool)
@@ -62,5 +63,5 @@ def detect_in_crop(
 
 
 def match_crop(towers: Sequence[DetectedTower], crop: Crop) -> TowerMatch:
-    """Detected towers of a crop against its labelled ones."""
+    """Match the detected towers of a crop with its labelled towers."""
     return match_towers(np.array([[tower.x, tower.y] for tower in towers]), crop.towers)

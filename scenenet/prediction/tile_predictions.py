@@ -12,7 +12,7 @@ import numpy as np
 
 from scenenet.core.progress import track
 from scenenet.detection.detect import DetectedTower, body_voxels, detect_towers
-from scenenet.detection.edge_distance import LOOK_M, edge_distance
+from scenenet.detection.edge_distance import MAX_M, edge_distance
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.prediction.occupied_voxels import OccupiedVoxels
@@ -102,7 +102,7 @@ class TilePredictions:
         towers = []
         for number, tower in enumerate(found, start=1):
             place = np.array([tower.x, tower.y])
-            around = occupied(place, LOOK_M * 1.5)
+            around = occupied(place, MAX_M * 1.5)
             body = around[body_voxels(tower, around, settings)]
             at_tau = zyx[tower.voxels[probability[tower.voxels] >= tau]]
             points = self._number(np.concatenate([body, self.spool.centres(at_tau)]), number)

@@ -114,10 +114,10 @@ def test_a_tower_weight_is_the_weight_of_all_towers_together(crops):
 
 def test_crops_without_a_tower_teach_nothing(crops):
     bare = [replace(crop, tower=np.zeros(len(crop.index), bool)) for crop in crops]
-    with pytest.raises(InputError, match=r"nothing of a tower voxel in the 4 training crops"):
+    with pytest.raises(InputError, match=r"the 4 training crops have no tower voxel"):
         fit(bare, FEW, 0)
     full = [replace(crop, tower=np.ones(len(crop.index), bool)) for crop in crops]
-    with pytest.raises(InputError, match="nothing other than tower voxels"):
+    with pytest.raises(InputError, match="have only tower voxels"):
         fit(full, FEW, 0)
     with pytest.raises(InputError, match="in the 0 training crops"):
         fit([], FEW, 0)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenenet.baselines.voxel_features import FARTHEST_WIRE_M, FEATURES, voxel_features
+from scenenet.baselines.voxel_features import FARTHEST_CONDUCTOR_M, FEATURES, voxel_features
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
 from scenenet.pointcloud import PointCloud, class_scheme
 
@@ -79,8 +79,8 @@ def test_a_pole_is_as_tall_as_it_is():
     assert middle["protrusion"] == pytest.approx(6.5)  # above ground voxels, 1 m high
     assert middle["reach_3"] == pytest.approx(1 / 29)  # columns of 1 m within 3 m
     assert middle["area_2"] == 5
-    assert middle["wire_distance"] == FARTHEST_WIRE_M
-    assert middle["wire_6"] == 0
+    assert middle["conductor_distance"] == FARTHEST_CONDUCTOR_M
+    assert middle["conductor_6"] == 0
 
 
 def test_ground_is_ground():
@@ -94,12 +94,12 @@ def test_ground_is_ground():
 def test_wires_are_seen_from_the_pole_and_from_themselves():
     sample = sample_of(flat_ground(), pole(), wire())
     body = at(sample, (20.1, 20.1, 5.5))
-    assert body["wire_distance"] <= 4  # near the pole the wire's surroundings are no line
-    assert body["wire_6"] >= 6
-    assert at(sample, (5.5, 20.5, 12.5))["wire_distance"] == 0
+    assert body["conductor_distance"] <= 4  # near the pole the wire's surroundings are no line
+    assert body["conductor_6"] >= 6
+    assert at(sample, (5.5, 20.5, 12.5))["conductor_distance"] == 0
     aside = at(sample, (20.5, 30.5, 0.5))
-    assert aside["wire_distance"] == pytest.approx(10, abs=1)
-    assert aside["wire_6"] == 0
+    assert aside["conductor_distance"] == pytest.approx(10, abs=1)
+    assert aside["conductor_6"] == 0
 
 
 def test_a_stray_return_high_above_is_no_top():
@@ -161,7 +161,7 @@ def test_half_the_voxel_size_gives_about_the_same():
         assert fine[name] == pytest.approx(coarse[name], abs=1.0), name
     for name in ("share_below_2", "linearity_4", "verticality_4", "tall_6", "tall_ring"):
         assert fine[name] == pytest.approx(coarse[name], abs=0.1), name
-    assert fine["wire_distance"] == pytest.approx(coarse["wire_distance"], abs=1.0)
+    assert fine["conductor_distance"] == pytest.approx(coarse["conductor_distance"], abs=1.0)
 
 
 def test_a_run_goes_on_over_a_gap_of_a_metre_and_not_of_two():
@@ -198,7 +198,7 @@ MEDIAN_OFF = {
     "run_2": 1.0,
     "mean_top_6": 2.0,
     "protrusion": 1.0,
-    "wire_distance": 1.0,
+    "conductor_distance": 1.0,
     "tall_6": 0.1,
     "linearity_4": 0.1,
 }

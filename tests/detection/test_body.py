@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.detection.body import middle, standing
+from scenenet.detection.body import centre_body, measure_body
 
 AXIS = np.array([0.5, 0.5])
 
 
 def stand(lattice, around, seen=(5.5, 14.5), at=AXIS, foot_radius=5.0):
     elevations = np.asarray(seen) + lattice.place[2]
-    return standing(around, at + lattice.place[:2], elevations, foot_radius, 1.0)
+    return measure_body(around, at + lattice.place[:2], elevations, foot_radius, 1.0)
 
 
 def lattice_tower(lattice, height: float, spread: float):
@@ -75,7 +75,7 @@ def test_the_middle_of_a_lattice_tower_is_found_from_its_legs(lattice):
     around = lattice.together(lattice.ground(), lattice_tower(lattice, 40.0, 4.0))
     leg = np.array([3.0, 3.0]) + lattice.place[:2]
     body = stand(lattice, around, seen=(10.5, 38.5))
-    axis, width, free = middle(around, leg, body, 1.0)
+    axis, width, free = centre_body(around, leg, body, 1.0)
     assert np.abs(axis - AXIS - lattice.place[:2]).max() < 0.6
     assert 2 < width < 6
     assert free > 0.5
@@ -85,7 +85,7 @@ def test_wires_and_crossarms_do_not_widen_a_body(lattice):
     pole = lattice.column(0, 0, 0, 16)
     wires = [lattice.wires(b, 13.0) for b in (70, 250)]
     around = lattice.together(lattice.ground(), pole, *wires)
-    axis, width, free = middle(around, AXIS + lattice.place[:2], stand(lattice, around), 1.0)
+    axis, width, free = centre_body(around, AXIS + lattice.place[:2], stand(lattice, around), 1.0)
     assert np.abs(axis - AXIS - lattice.place[:2]).max() < 0.1
     assert width == pytest.approx(1.0)
     assert 0.8 < free < 1  # not where the wires are
@@ -95,7 +95,7 @@ def test_what_nowhere_stands_free_has_no_width(lattice):
     x, y, z = (side.ravel() for side in np.meshgrid(*[np.arange(-9, 10)] * 2, np.arange(0, 16)))
     block = lattice.voxels(np.column_stack([x, y, z]))
     at = AXIS + lattice.place[:2]
-    axis, width, free = middle(block, at, stand(lattice, block), 1.0)
+    axis, width, free = centre_body(block, at, stand(lattice, block), 1.0)
     assert np.isnan(width)
     assert free == 0
     assert np.array_equal(axis, at)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scenenet.detection.detect import among, body_voxels, detect_towers
+from scenenet.detection.detect import body_voxels, detect_towers, surroundings_in
 from scenenet.detection.settings import DetectionSettings
 
 TAU = 0.5
@@ -30,7 +30,7 @@ def pole(lattice):
 def detect(detected, around, probability=0.9, **changes):
     given_probability = np.broadcast_to(np.asarray(probability, float), len(detected))
     return detect_towers(
-        detected, given_probability, among(around), 1.0, TAU, DetectionSettings(**changes)
+        detected, given_probability, surroundings_in(around), 1.0, TAU, DetectionSettings(**changes)
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.detection.edge_distance import CELL_M, LOOK_M, edge_distance
+from scenenet.detection.edge_distance import CELL_M, MAX_M, edge_distance
 
 PLACE = np.array([500_123.4, 4_630_567.8])
 REACH = 80.0
@@ -18,7 +18,7 @@ def field(keep) -> np.ndarray:
 
 
 def test_amid_the_data_the_edge_is_as_far_as_one_looks():
-    assert edge_distance(PLACE, field(lambda x, y: np.ones_like(x, bool))) == LOOK_M
+    assert edge_distance(PLACE, field(lambda x, y: np.ones_like(x, bool))) == MAX_M
 
 
 @pytest.mark.parametrize("away", [4.0, 11.0, 25.0, 44.0])
@@ -36,7 +36,7 @@ def test_the_nearest_edge_counts():
 
 def test_a_gap_as_narrow_as_a_shadow_is_no_edge():
     ground = field(lambda x, y: np.abs(x - 10) > 1.5)
-    assert edge_distance(PLACE, ground) == pytest.approx(LOOK_M, abs=CELL_M)
+    assert edge_distance(PLACE, ground) == pytest.approx(MAX_M, abs=CELL_M)
 
 
 def test_a_wide_hole_is_an_edge():
@@ -45,7 +45,7 @@ def test_a_wide_hole_is_an_edge():
 
 
 def test_an_edge_beyond_reach_does_not_count():
-    assert edge_distance(PLACE, field(lambda x, y: x < 70)) == LOOK_M
+    assert edge_distance(PLACE, field(lambda x, y: x < 70)) == MAX_M
 
 
 def test_outside_the_data_there_is_no_distance_to_speak_of():

@@ -146,8 +146,8 @@ def test_wires_are_listed_with_their_tower_and_a_lone_pole_is_none(scene, model,
     [tower] = found.towers["features"]
     assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.6)
     told = tower["properties"]
-    assert told["wire_directions"] == 2
-    assert sorted(round(b) % 360 for b in told["wire_bearings"]) == [0, 180]
+    assert told["conductor_directions"] == 2
+    assert sorted(round(b) % 360 for b in told["conductor_bearings"]) == [0, 180]
     assert 1.0 <= told["width"] <= 2.0
     assert set(np.unique(found.points["tower_id"])) == {0, 1}
 

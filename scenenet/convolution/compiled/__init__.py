@@ -1,12 +1,14 @@
-"""The compiled loops below the convolution: runs of voxels, planes of output, vector rows.
+"""The compiled loops of the convolution: runs of voxels, planes of output, vector rows.
 
-Nothing outside this package and its users, ``convolution``, ``observer`` and ``voxels``, needs to
-know how the sum is organised; ``docs/method/performance.md`` says why it is organised like this.
+Only ``scenenet.convolution`` uses this package. ``docs/method/performance.md`` explains how the sum
+is organised and why.
 
-- ``runs``: occupied voxels, gathered four by four along x.
-- ``tables``: the kernel, laid out for every pattern of four voxels; and back, for its gradient.
-- ``planes``: one horizontal plane of the answer in a cache-sized buffer, summed and read back.
-- ``rows``: the vector instruction that all of it comes down to.
-- ``activate``: tanh and ReLU.
-- ``counting``: points counted into voxels, before any of this.
+- ``runs``: occupied voxels, grouped by four along x.
+- ``kernel_tables``: the kernel, arranged for every pattern of four voxels; and back, for its
+  gradient.
+- ``planes``: one horizontal plane of the output in a buffer that fits the cache.
+- ``volumes``: all planes of the output, with or without activation.
+- ``rows``: a multiply-add over a row, as one vector instruction.
+- ``activation``: tanh and ReLU.
+- ``options``: how a batch is divided among cores.
 """

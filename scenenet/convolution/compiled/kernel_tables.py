@@ -1,4 +1,4 @@
-"""What every pattern of a run adds to the answer, and the way back for the gradient.
+"""What each pattern of a run adds to the response, and the reverse for the gradient.
 
 Lane l of a row belongs to the output at x + l - (kx - 1) + (kx - 1) // 2, x the run's first voxel.
 """
@@ -14,15 +14,16 @@ from scenenet.core.compilation import COMPILED
 
 
 def lanes_of(kernel_width: int) -> int:
-    """Numbers that a run adds to a row of the answer, rounded up to whole vector rows."""
+    """Numbers that a run adds to a row of the response, rounded up to whole vector rows."""
     return -(-(RUN + kernel_width - 1) // LANES) * LANES
 
 
 @numba.njit(**COMPILED)
 def table_of(kernel):  # pragma: no cover - compiled
-    """The table of a kernel (kz, ky, kx): (kz, 2^RUN, ky, lanes), a row for each pattern.
+    """The table (kz, 2^RUN, ky, lanes) of a kernel (kz, ky, kx), with one row for each pattern.
 
-    The row of a pattern is the row of the pattern without its lowest voxel, plus that voxel's.
+    The row of a pattern is the row of the pattern without its lowest voxel, plus the row of that
+    voxel alone.
     """
     kz, ky, kx = kernel.shape
     lanes = (RUN + kx - 1 + LANES - 1) // LANES * LANES
@@ -44,7 +45,7 @@ def kernel_of(tables, kx):  # pragma: no cover - compiled
     """The transpose of ``table_of``: the gradient of a kernel from that of its table.
 
     Args:
-        tables: (parts, kz, 2^RUN, ky, lanes), overwritten; the parts are summed in their order.
+        tables: (parts, kz, 2^RUN, ky, lanes), overwritten; the parts are summed in order.
         kx: width of the kernel.
     """
     parts, kz, _, ky, _ = tables.shape

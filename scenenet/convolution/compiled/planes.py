@@ -1,8 +1,7 @@
-"""One horizontal plane of the answer, in a buffer that stays in the first-level cache.
+"""One horizontal plane of the response, in a buffer that stays in the first-level cache.
 
-The buffer has a border, wide enough for what a voxel adds beyond the edge of the grid, so that no
-step of the sum needs to ask where the edge is. Output (y, x) lies at row y + ``above``, column
-x + ``left`` of the buffer.
+The buffer has a border, wide enough for what a voxel adds beyond the edge of the grid, so the loops
+need no test for the edge. Output (y, x) is at row y + ``above``, column x + ``left`` of the buffer.
 """
 
 from __future__ import annotations
@@ -19,18 +18,18 @@ def layout(table, kx, height, width):  # pragma: no cover - compiled
     """(rows, row length, above, left) of the buffer for a plane (height, width)."""
     ky, lanes = table.shape[-2:]
     above, left = ky - 1 - (ky - 1) // 2, kx - 1 - (kx - 1) // 2
-    # A run begins at most at the last multiple of RUN and writes all its lanes.
+    # The last run starts at the last multiple of RUN and writes all its lanes.
     return height + ky - 1, (width + RUN - 1) // RUN * RUN + lanes, above, left
 
 
 @numba.njit(**COMPILED)
 def sum_plane(p, runs, table, buffer, row_length, reached):  # pragma: no cover - compiled
-    """Add up plane ``p`` of the batch: the answer of its grid's occupied voxels near it.
+    """Compute plane ``p`` of the batch from the occupied voxels of its grid.
 
     Args:
         table: of ``scenenet.convolution.compiled.kernel_tables``, (kz, 2^RUN, ky, lanes).
         buffer: 1D, overwritten.
-        reached: (H,) bool, overwritten: whether any voxel reaches the row. All others are zero.
+        reached: (H,) bool, overwritten: whether any voxel contributes to the row. Other rows are 0.
 
     Returns:
         whether any row is reached.
@@ -51,7 +50,7 @@ def sum_plane(p, runs, table, buffer, row_length, reached):  # pragma: no cover 
             reached[runs.y[i]] = True
             factor = table.dtype.type(runs.value[i])
             to = runs.y[i] * row_length + runs.x[i]
-            # Row y of the buffer takes the kernel's last row, row y + ky - 1 its first.
+            # The kernel's last row goes to row y of the buffer, its first row to y + ky - 1.
             row = ((qz * patterns + runs.pattern[i]) * ky + ky - 1) * lanes
             add_rows(buffer, to, row_length, flat, row, -lanes, ky, lanes, factor)
     if occupied:
@@ -84,7 +83,7 @@ def gather_plane(p, runs, upstream, row_length, table):  # pragma: no cover - co
 
 @numba.njit(**COMPILED)
 def _widen(flags, before, behind):  # pragma: no cover - compiled
-    """Set every flag from ``before`` places ahead of a set one to ``behind`` places after it."""
+    """Set every flag from ``before`` places before a set flag to ``behind`` places after it."""
     was = flags.copy()
     for i in range(len(flags)):
         if was[i]:

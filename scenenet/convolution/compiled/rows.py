@@ -1,4 +1,4 @@
-"""One multiply-add over a row of neighbouring numbers, as one vector instruction."""
+"""A multiply-add over a row of neighbouring numbers, as one vector instruction."""
 
 from __future__ import annotations
 
@@ -17,9 +17,8 @@ LANES = 16
 def add_row(typing_context, into, i, row, j, factor):
     """into[i : i + LANES] += factor * row[j : j + LANES], for 1D arrays of one float type.
 
-    Nothing checks the bounds, and ``into`` and ``row`` must not overlap. A plain loop of sixteen
-    steps becomes the same instructions only behind a test for overlap, which takes longer than they
-    do.
+    The bounds are not checked, and ``into`` and ``row`` must not overlap. A compiler would turn a
+    plain loop into the same instructions with a test for overlap, which takes longer than they do.
     """
     signature = types.void(into, types.intp, row, types.intp, row.dtype)
 
@@ -40,7 +39,7 @@ def add_row(typing_context, into, i, row, j, factor):
         first = builder.insert_element(nothing, arguments[4], ir.Constant(ir.IntType(32), 0))
         spread = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
         factors = builder.shuffle_vector(first, nothing, spread)
-        # The two may become one instruction where the machine has one.
+        # "contract" allows a fused multiply-add where the machine has one.
         product = builder.fmul(factors, added, flags=("contract",))
         after = builder.fadd(product, before, flags=("contract",))
         builder.store(after, target, align=bytes_each)
@@ -52,7 +51,7 @@ def add_row(typing_context, into, i, row, j, factor):
 @numba.njit(**COMPILED)
 def add_rows(into, i, i_step, row, j, j_step, n_rows, lanes, factor):  # pragma: no cover - compiled
     """``add_row`` on ``n_rows`` rows of ``lanes`` numbers, ``i_step`` and ``j_step`` apart."""
-    if lanes == LANES:  # a loop less, in the usual case
+    if lanes == LANES:  # the usual case, with one loop less
         for _ in range(n_rows):
             add_row(into, i, row, j, factor)  # type: ignore[call-arg]
             i += i_step

@@ -1,4 +1,4 @@
-"""Occupied voxels gathered into runs: four neighbours along x, of which a pattern is occupied."""
+"""Runs of voxels: four neighbours along x, with the pattern of the occupied ones."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 from scenenet.core.compilation import COMPILED
 
 RUN = 4
-"""Voxels in a run. With kernels up to 13 wide, a run adds 16 numbers to a row of the answer: one
-vector. In real crops there are 2.4 times fewer runs than voxels."""
+"""Voxels in a run. With kernels up to 13 wide, a run adds 16 numbers to a row of the response: one
+vector. Real crops have 2.4 times fewer runs than voxels."""
 
 
 class Runs(NamedTuple):
-    """The runs of a batch of B grids (D, H, W), plane after plane.
+    """The runs of a batch of B grids (D, H, W), plane by plane.
 
     Attributes:
         y: (R,) int32.
-        x: (R,) int32, of the run's first voxel.
+        x: (R,) int32, x of the first voxel of the run.
         pattern: (R,) int32, bit i set where voxel x + i is occupied.
         value: (R,) float64, the measurement phi of its voxels.
         planes: (B * D + 1,) int64, plane p of the batch has runs planes[p] to planes[p + 1].
-        shape: (3,) int64: D, H, W. An array, since compiled loops that share out their work take no
-            tuple within a tuple.
+        shape: (3,) int64: D, H, W. An array, because parallel compiled loops cannot take a tuple
+            within a tuple.
     """
 
     y: np.ndarray
@@ -42,8 +42,8 @@ def runs_of(
 
     Args:
         index: (M,) int64 flat positions in (D, H, W), ascending within each grid.
-        values: (M,) float, or None where every value is one. Voxels of different values have a run
-            each, since a pattern knows no values.
+        values: (M,) float, or None if every value is one. With values each voxel is a run of its
+            own, because a pattern has no values.
         offsets: (B + 1,) int64, grid b holds rows offsets[b] to offsets[b + 1].
     """
     some = np.empty(0) if values is None else values.astype(np.float64, copy=False)
@@ -63,7 +63,7 @@ def _gather(index, values, valued, offsets, shape):  # pragma: no cover - compil
         begin, plane_ends, row_ends = np.int64(-1), np.int64(-1), np.int64(-1)
         plane = row = np.int64(0)
         for i in range(offsets[b], offsets[b + 1]):
-            # Flat positions ascend, so a division is needed only where a plane or a row ends.
+            # Flat positions ascend, so a division is only needed when a plane or a row ends.
             if index[i] >= plane_ends:
                 plane = index[i] // (height * width)
                 plane_ends = (plane + 1) * height * width

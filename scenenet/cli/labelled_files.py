@@ -1,4 +1,4 @@
-"""Labelled files as a dataset, and a model from them, without the workflow."""
+"""Training and scoring with labelled files, without the workflow."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from scenenet.training.tuning import choose
 
 @dataclass(frozen=True)
 class LabelledFiles:
-    """What labelled files hold.
+    """The content of labelled files.
 
     Attributes:
         dataset: their crops on grids.
-        parts: part of each crop by its id; empty where no split was asked for or possible.
-        surveys: table of labelled towers of each survey (TS40K samples are no surveys).
-        survey_crops: ids of the crops that were cut out of surveys.
-        skipped: files or samples that gave no crop, with the reason.
+        parts: part of each crop by its id; empty without a split or with a single crop.
+        surveys: table of labelled towers of each survey, TS40K samples excluded.
+        survey_crops: ids of the crops that were cut from surveys.
+        skipped: files or samples without a crop, with the reason.
     """
 
     dataset: Dataset
@@ -57,12 +57,12 @@ def read_labelled(
     grid: VoxelSettings,
     split: SplitSettings | None = None,
 ) -> LabelledFiles:
-    """Take every labelled file through towers, crops and voxels.
+    """Cut crops around the labelled towers of files, and voxelise them.
 
     Args:
         paths: surveys (cut into crops around their towers), and TS40K samples or folders of them.
         codes: class scheme of the labels.
-        split: how to split the crops; a single crop is not split.
+        split: the shares of the split; a single crop is not split.
 
     Raises:
         InputError: a file cannot be read.
@@ -109,14 +109,14 @@ def train_files(
     provenance: dict[str, Any],
     out: str | Path,
 ) -> dict[str, Any]:
-    """Train with several seeds, tune each on the crops kept for validation, write the best.
+    """Train with several seeds, tune each model on the validation crops, and write the best one.
 
     Args:
-        validation: share of the crops to tune on. With a single crop, or 0, the training crops
-            themselves are used, which flatters the scores and is said in the answer.
+        validation: share of the crops for tuning. With 0 or a single crop, models are tuned on the
+            training crops. The scores are then too high, and ``tuned_on`` is ``training``.
 
     Returns:
-        the scores of each seed, the chosen one, the numbers of crops and what was skipped.
+        the scores of each seed, the chosen seed, the numbers of crops, and the skipped files.
 
     Raises:
         InputError: a file cannot be read, or none has a labelled tower.
@@ -126,15 +126,16 @@ def train_files(
     data = files.dataset
     _require_crops(data, paths)
     kept = [s for s in data.samples if files.parts.get(s.id) == "validation"]
-    learnt = [s for s in data.samples if files.parts.get(s.id) != "validation"]
-    training = replace(data, samples=learnt)
-    tried = []
+    training = [s for s in data.samples if files.parts.get(s.id) != "validation"]
+    candidates = []
     for seed in seeds:
-        model, _ = fit(learnt, kept, settings, seed)
-        card = card_of(training, settings, grid, seed, provenance)
-        tuned, card, result = choose(model, card, kept or learnt, tuning, learnt if kept else ())
-        tried.append((seed, tuned, card, result))
-    seed, tuned, card, result = max(tried, key=lambda entry: entry[3]["validation"]["f05"])
+        model, _ = fit(training, kept, settings, seed)
+        card = card_of(replace(data, samples=training), settings, grid, seed, provenance)
+        tuned, card, result = choose(
+            model, card, kept or training, tuning, training if kept else ()
+        )
+        candidates.append((seed, tuned, card, result))
+    seed, tuned, card, result = max(candidates, key=lambda entry: entry[3]["validation"]["f05"])
     write_model(out, tuned, card)
     return {
         "model": str(out),
@@ -144,9 +145,10 @@ def train_files(
         "tuned_on": "validation" if kept else "training",
         "scores": result["validation"],
         "seeds": [
-            {"seed": s, "kernel_size": r["kernel_size"], **r["validation"]} for s, _, _, r in tried
+            {"seed": s, "kernel_size": r["kernel_size"], **r["validation"]}
+            for s, _, _, r in candidates
         ],
-        "crops": {"training": len(learnt), "validation": len(kept)},
+        "crops": {"training": len(training), "validation": len(kept)},
         "skipped": files.skipped,
     }
 
@@ -161,15 +163,15 @@ def evaluate_files(
     """Scores of a model on labelled files.
 
     Args:
-        grid: the grid for the voxel scores; None for the model's own voxel size. In that case the
-            towers of surveys are looked for in the whole survey and not in crops around the true
-            ones, so that false towers anywhere count, and surveys without towers as well.
+        grid: the grid for the voxel scores; None for the model's own voxel size. With None, towers
+            are detected in whole surveys instead of crops around the labelled towers, so that
+            false towers everywhere count, also in surveys without towers.
 
     Returns:
-        as ``scenenet.evaluation.scoring.score``, with ``skipped``.
+        the evaluation as plain values, with ``skipped``.
 
     Raises:
-        InputError: a file cannot be read, or none has anything to score.
+        InputError: a file cannot be read, or no file has a crop or survey to score.
     """
     trained, card = read_model(model)
     whole_surveys = grid is None
@@ -194,7 +196,7 @@ def evaluate_files(
 def _survey_towers(
     survey: Path, towers: pd.DataFrame, model: str | Path, detection: DetectionSettings
 ) -> TowerMatch:
-    """Towers found anywhere in a survey against its labelled ones."""
+    """Match the towers detected in a whole survey with its labelled towers."""
     with predict_survey(survey, model, PredictSettings(), detection) as prediction:
         found = np.array([[tower.x, tower.y] for tower in prediction.towers])
     return match_towers(found, towers[["x", "y"]].to_numpy(float))

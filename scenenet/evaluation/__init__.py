@@ -1,1 +1,1 @@
-"""Scores of a trained model on labelled crops, and the time that it takes (thesis 5.2.4, 5.2.6)."""
+"""Scores of models on labelled crops, and their speed (thesis 5.2.4, 5.2.6)."""

@@ -1,4 +1,4 @@
-"""How long a model takes to answer a crop (thesis 5.2.6)."""
+"""Inference time of a model for a crop (thesis 5.2.6)."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from scenenet.models.model_file import read_model
 from scenenet.models.predictions import probabilities
 
 RESOLUTIONS = (64, 128)
-"""Voxels an edge: the thesis' grid, and the finer one of its 5.2.7."""
+"""Voxels per edge: the grid of the thesis, and the finer one of thesis 5.2.7."""
 CROPS = 6
-"""Crops that are timed; the first ones of the test part by name."""
+"""Number of timed crops, the first of the test part by name."""
 REPEATS = 5
 
-Answer = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
+Predict = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
 
 
 def time_model(
     model: str | Path, crop_manifests: Sequence[str | Path], split: str | Path
 ) -> dict[str, Any]:
-    """The time a tuned model takes for a test crop on each grid of ``RESOLUTIONS``.
+    """The time that a tuned model takes for a test crop on each grid of ``RESOLUTIONS``.
 
     Returns:
-        model, seed, crops (number of them) and ``inference_ms``: voxels an edge -> median, ms.
+        model, seed, crops (their number) and ``inference_ms``: voxels per edge -> median, ms.
 
     Raises:
         InputError: no crop is in the test part.
@@ -49,34 +49,34 @@ def time_model(
     if not clouds:
         raise InputError("no crop is in the test part", file=split)
 
-    def answer(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
+    def predict(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         return probabilities(trained, sample, card.measurement)
 
-    took = {}
+    inference_ms = {}
     for resolution in track(RESOLUTIONS, f"{card.name}: grids timed"):
         samples = [
             voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution), name)
             for name, cloud in sorted(clouds.items())
         ]
-        took[str(resolution)] = milliseconds(answer, samples)
+        inference_ms[str(resolution)] = milliseconds(predict, samples)
     return {
         "model": card.name,
         "seed": card.provenance.get("seed"),
         "crops": len(clouds),
-        "inference_ms": took,
+        "inference_ms": inference_ms,
     }
 
 
-def milliseconds(answer: Answer, samples: Sequence[VoxelSample], repeats: int = REPEATS) -> float:
-    """From occupied voxels to the probability of every voxel: median over samples of the median
-    over repeats, ms. A first call of each, which may compile or fill a cache, does not count."""
-    of_samples = []
+def milliseconds(predict: Predict, samples: Sequence[VoxelSample], repeats: int = REPEATS) -> float:
+    """Time from occupied voxels to the probability of every voxel, ms: the median over samples of
+    the median over repeats. The first call for each sample, which may compile, does not count."""
+    medians = []
     for sample in samples:
-        answer(sample)
-        took = []
+        predict(sample)
+        times = []
         for _ in range(repeats):
             begin = time.perf_counter()
-            answer(sample)
-            took.append(1e3 * (time.perf_counter() - begin))
-        of_samples.append(median(took))
-    return median(of_samples)
+            predict(sample)
+            times.append(1e3 * (time.perf_counter() - begin))
+        medians.append(median(times))
+    return median(medians)

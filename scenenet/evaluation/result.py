@@ -36,12 +36,12 @@ class VoxelScores:
 
 @dataclass(frozen=True)
 class TowerScores:
-    """Detected towers against true ones.
+    """Scores of detected towers against labelled ones.
 
     Attributes:
         precision, recall: of the detected towers.
-        median_error_m: m, planar distance of the true positives; None without any.
-        n_true, n_predicted: number of towers.
+        median_error_m: m, median planar position error of the true positives; None without any.
+        n_true, n_predicted: number of labelled and of detected towers.
     """
 
     precision: float
@@ -63,8 +63,8 @@ class SampleScores:
         id: of the crop.
         precision, recall, f05, iou_tower, miou: as in ``VoxelScores``.
         tp, fp, fn, tn: numbers of voxels.
-        towers_true, towers_predicted: numbers of towers.
-        position_error_m: m, of the nearest true positive; None without any.
+        towers_true, towers_predicted: number of labelled and of detected towers.
+        position_error_m: m, smallest position error of a true positive; None without any.
         f05_observer, f05_towers: F0.5 of the voxels at or above tau, and of whole towers.
     """
 
@@ -93,7 +93,7 @@ class Evaluation:
         model, seed: name and seed of the model.
         alive: whether any tower voxel is at or above tau; a model without one is dead.
         whole_towers: whether ``voxel`` and ``per_sample`` count the voxels of whole towers.
-        voxel: one of the next two.
+        voxel: ``voxel_towers`` or ``voxel_observer``, depending on ``whole_towers``.
         voxel_observer: scores of the voxels at or above tau.
         voxel_towers: scores of the voxels of the detected towers with their bodies.
         voxel_trivial: scores of a model that predicts no tower.
@@ -102,8 +102,8 @@ class Evaluation:
         per_sample: scores of each crop.
         pr_curve: tau, precision, recall and f05 at every threshold.
         average_precision: area under the precision-recall curve.
-        part: part of the split, where there is one.
-        parameters: number of parameters, where the file is the only place that has it.
+        part: part of the split; None without a split.
+        parameters: number of parameters; None if the model file has it.
     """
 
     model: str
@@ -123,7 +123,7 @@ class Evaluation:
     parameters: int | None = None
 
     def to_json(self) -> dict[str, Any]:
-        """Plain numbers; ``part`` and ``parameters`` come first, and only where they are known."""
+        """Plain values; ``part`` and ``parameters`` come first, unless they are None."""
         values = asdict(self)
         values["per_sample"] = list(values["per_sample"])
         optional = {name: values.pop(name) for name in ("part", "parameters")}
@@ -131,10 +131,10 @@ class Evaluation:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Evaluation:
-        """The evaluation that ``to_json`` gave.
+        """The evaluation from the result of ``to_json``.
 
         Raises:
-            KeyError, TypeError: a score is missing, or there is an unknown one.
+            KeyError, TypeError: a score is missing or unknown.
         """
         optional = {"part": data.get("part"), "parameters": data.get("parameters")}
         values = {f.name: data[f.name] for f in fields(cls) if f.name not in optional} | optional

@@ -76,7 +76,7 @@ def score_predictions(
 
     Args:
         name, seed: of the model.
-        predict: probability (V,) and truth (V,) bool of every voxel of a sample's grid.
+        predict: gives the probability (V,) and the label (V,) bool of every voxel of a sample.
         whole_towers: whether ``voxel`` and ``per_sample`` count whole towers
             (docs/method/detection.md).
     """
@@ -88,7 +88,7 @@ def score_predictions(
 
 
 class _Tally:
-    """The counts of all samples so far."""
+    """Sums of the counts of samples."""
 
     def __init__(self, tau: float, detection: DetectionSettings, whole_towers: bool) -> None:
         self._tau, self._detection, self._whole_towers = tau, detection, whole_towers
@@ -100,7 +100,7 @@ class _Tally:
     def add(
         self, sample: VoxelSample, crop: Crop, probability: np.ndarray, truth: np.ndarray
     ) -> None:
-        """Count a sample; probability (V,) and truth (V,) bool of every voxel of its grid."""
+        """Count a sample with the probability (V,) and label (V,) bool of every voxel."""
         found = detect_in_crop(sample, probability, self._tau, self._detection)
         of_a_tower, _ = sample.spread(found.voxels)
         observer = confusion(probability, truth, self._tau)

@@ -1,4 +1,4 @@
-"""How long crops take to become voxels on the grids of the thesis (thesis 5.1.4)."""
+"""Voxelisation time of crops on the grids of the thesis (thesis 5.1.4)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RESOLUTIONS = (32, 64, 128)
-"""Voxels an edge that the thesis gives times for."""
+"""Voxels per edge of the grids that the thesis times."""
 
 COLUMNS = ("grid", "crop", "seconds", "occupied", "tower")
 
@@ -25,11 +25,11 @@ def time_grids(crop_manifests: Sequence[str | Path], out: str | Path) -> pd.Data
 
     Args:
         crop_manifests: of the crop stores.
-        out: CSV file, columns ``COLUMNS``: seconds without reading files, occupied voxels, and
-            tower voxels among them.
+        out: CSV file with the columns ``COLUMNS``: seconds without reading files, number of
+            occupied voxels and of tower voxels among them.
 
     Returns:
-        what was written.
+        the table in ``out``.
     """
     import pandas as pd
 

@@ -1,4 +1,4 @@
-"""What all voxel models have in common (thesis 4.3)."""
+"""The base of all voxel models (thesis 4.3)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class VoxelModel(nn.Module):
 
     Attributes:
         kind: name of the architecture in model files and tables.
-        units: ``voxel`` or ``m``, what the kernels are defined in.
+        units: ``voxel`` or ``m``, the unit of lengths of the kernels.
         tau_from_training: whether tau is chosen on the training crops as well as on validation.
         kernel_size: (kz, ky, kx) in voxels.
         voxel_size: m, edge of the voxels that the kernels are sampled at; None where they are
@@ -35,12 +35,12 @@ class VoxelModel(nn.Module):
     voxel_size: float | None = None
 
     def at(self, voxel_size: float) -> Self:
-        """The model for voxels of ``voxel_size`` m, which shares the trained numbers; the model
-        itself where its kernels are in voxels."""
+        """The model sampled at voxels of ``voxel_size`` m, sharing the trained numbers; the model
+        itself if its kernels are in voxels."""
         return self
 
     def observed_size(self, voxel_size: float) -> float:
-        """Edge in m of the voxels or blocks of voxels through which the model observes a grid of
+        """Edge in m of the voxels, or blocks of voxels, in which the model observes a grid of
         ``voxel_size`` m."""
         return voxel_size
 
@@ -67,13 +67,13 @@ class VoxelModel(nn.Module):
 
     @property
     def reach(self) -> tuple[int, int, int]:
-        """Voxels (z, y, x) to each side of a voxel that influence its probability."""
+        """Receptive field: voxels (z, y, x) to each side of a voxel that influence it."""
         kz, ky, kx = self.kernel_size
         return kz // 2, ky // 2, kx // 2
 
     def argmax_rows(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
-        """(M,) row of the occupied voxel whose response each one takes; its own row unless the
-        model works on cross-sections.
+        """(M,) row of the occupied voxel whose response each occupied voxel takes; its own row
+        unless the model uses cross-sections.
 
         Args:
             observed: (M,) H at the occupied voxels.

@@ -24,7 +24,8 @@ class CNN(VoxelModel):
         *,
         generator: torch.Generator | None = None,
     ) -> None:
-        """Draw weights and biases from U(-1/sqrt(n), 1/sqrt(n)), n voxels, as torch's Conv3d."""
+        """Draw weights and biases from U(-1/sqrt(n), 1/sqrt(n)), like torch's Conv3d, with n the
+        number of voxels of a kernel."""
         super().__init__()
         self.kernel_size = kernel_size
         bound = float(torch.tensor(kernel_size).prod()) ** -0.5

@@ -12,7 +12,7 @@ from scenenet.models.settings import ModelSettings
 
 
 def new_model(settings: ModelSettings, seed: int) -> VoxelModel:
-    """A model as ``settings`` say, its numbers drawn with ``seed``."""
+    """An initial model with the architecture of ``settings``, drawn with ``seed``."""
     generator = torch.Generator().manual_seed(seed)
     if settings.kind == "cnn":
         return CNN(settings.n_kernels, settings.kernel_size, generator=generator)

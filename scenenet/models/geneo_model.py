@@ -1,4 +1,4 @@
-"""What the SCENE-Nets in voxels and in metres share: a convex combination of GENEOs (Eq. 4.1)."""
+"""The base of SCENE-Nets in voxels and in metres: a convex combination of GENEOs (Eq. 4.1)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class GeneoModel(VoxelModel):
     parameters and two mixing weights; the third weight is 1 minus the others.
 
     Attributes:
-        geneos: kernel names, as given.
-        names: the same, distinct: the second arrow is ``arrow_2``.
+        geneos: kernel names, which may be repeated.
+        names: the same names made distinct: the second arrow is ``arrow_2``.
         shapes, mixing: the trained numbers. A subclass decides how they map to shape parameters
             and mixing weights.
     """
@@ -40,7 +40,7 @@ class GeneoModel(VoxelModel):
             generator: source of the random numbers; torch's default if None.
 
         Raises:
-            InputError: a kernel is unknown, or there is none.
+            InputError: a kernel is unknown, or ``geneos`` is empty.
         """
         super().__init__()
         if not geneos:
@@ -61,11 +61,11 @@ class GeneoModel(VoxelModel):
 
     @abstractmethod
     def _initial_shape(self, parameter: ShapeParameter, drawn: Tensor) -> Tensor:
-        """The number that is trained for ``parameter``, from ``drawn`` () in [0, 1)."""
+        """Initial value of the stored number of ``parameter``, from ``drawn`` () in [0, 1)."""
 
     @abstractmethod
     def _initial_mixing(self, drawn: Tensor) -> Tensor:
-        """The number that is trained for a mixing weight, from ``drawn`` () in [0, 1)."""
+        """Initial value of the stored number of a mixing weight, from ``drawn`` () in [0, 1)."""
 
     @abstractmethod
     def shape_of(self, name: str) -> dict[str, Tensor]:
@@ -89,7 +89,7 @@ class GeneoModel(VoxelModel):
 
     @abstractmethod
     def _assign(self, numbers: Mapping[str, float]) -> None:
-        """Take the checked ``numbers`` of ``set_shape_parameters``."""
+        """Store the verified ``numbers`` of ``set_shape_parameters``."""
 
     def parameters_of(self, name: str) -> tuple[ShapeParameter, ...]:
         """Shape parameters of the kernel behind the GENEO called ``name``."""
@@ -149,7 +149,7 @@ class GeneoModel(VoxelModel):
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
-    """Names with a number after the second and later of a kind: arrow, arrow_2."""
+    """Names with a number appended to repeated ones: arrow, arrow_2."""
     seen: dict[str, int] = {}
     distinct = []
     for name in names:

@@ -23,11 +23,11 @@ from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.settings import THESIS_GENEOS, KernelSize, MetricSettings
 
 COLUMN_M = 2.0
-"""Occupied metres of a tower's axis at which the observer H is 1. It only sets the scale of H: the
-twelve metres that the kernels reach then give at most 6, where float32 still resolves
+"""Occupied length of a tower's axis, m, at which the observer H is 1. It only sets the scale of H:
+the twelve metres that the kernels reach then give at most 6, where float32 still resolves
 probabilities."""
 TINY = 1e-9
-"""Smaller mixing weights are read as this one."""
+"""Smallest mixing weight that is stored; smaller ones are replaced by it."""
 LOGIT_END = 16.0
 """Largest |logit|: float32 cannot distinguish a sigmoid beyond it from its bound."""
 
@@ -58,7 +58,7 @@ class MetricSceneNet(GeneoModel):
         *,
         generator: torch.Generator | None = None,
     ) -> None:
-        """Draw the parameters at random over their ranges; the voxel size is 1 m at first.
+        """Draw the parameters at random over their ranges; the initial voxel size is 1 m.
 
         Args:
             geneos: kernel names; a name may be repeated.
@@ -66,7 +66,7 @@ class MetricSceneNet(GeneoModel):
             generator: source of the random numbers; torch's default if None.
 
         Raises:
-            InputError: a kernel is unknown, or there is none.
+            InputError: a kernel is unknown, or ``geneos`` is empty.
         """
         super().__init__(geneos, generator)
         self.metric = metric or MetricSettings()
@@ -105,7 +105,7 @@ class MetricSceneNet(GeneoModel):
         return float(curve.tau[self.best_step(curve)[0]])
 
     def best_step(self, curve: ThresholdCurve) -> tuple[int, float]:
-        """Number of ``best_tau`` in the thresholds, and the weighted F0.5 there."""
+        """Index of ``best_tau`` in the thresholds, and the weighted F0.5 at it."""
         return best_step(curve, self.metric.false_weight)
 
     @property

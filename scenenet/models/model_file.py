@@ -24,28 +24,29 @@ from scenenet.models.settings import KernelSize, MetricSettings
 FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
 METRIC_VERSION = 3
-"""Of a SCENE-Net in metres, which versions without metric kernels cannot read."""
+"""Version of the file of a SCENE-Net in metres."""
 FIELD_VERSION = 2
-"""The same as version 0.1 of this package wrote it: the lengths are called ``field`` there."""
+"""Version of the same file from version 0.1 of this package, where the lengths are ``field``."""
 
 
 class ModelCard(Settings):
-    """What has to be known to use a model, and where it is from."""
+    """The facts that using a model requires, and its origin."""
 
     name: str = Field(description="name in results and tables")
-    codes: str = Field(description="class scheme of the labels it learnt from")
+    codes: str = Field(description="class scheme of the training labels")
     measurement: Measurement = Field(description="phi of its input")
-    fit: Fit = Field(description="grid that it was trained on")
-    resolution: int = Field(gt=0, description="voxels an edge of that grid, for fit cube")
+    fit: Fit = Field(description="kind of grid that it was trained on")
+    resolution: int = Field(gt=0, description="voxels per edge of that grid, for fit cube")
     voxel_size: float = Field(
         gt=0, description="m, median of the training crops; surveys are predicted at this size"
     )
     tau: float | None = Field(None, gt=0, le=1, description="threshold; None before tuning")
     provenance: dict[str, Any] = Field(
-        default_factory=dict, description="seed, config, data and code that made it"
+        default_factory=dict, description="seed, configuration, data and code of the training"
     )
 
     def with_tau(self, tau: float) -> ModelCard:
+        """The card with another threshold."""
         return self.model_copy(update={"tau": tau})
 
     def threshold(self) -> float:
@@ -63,12 +64,16 @@ class ModelCard(Settings):
 
 
 def suffix(kind: str) -> str:
-    """Ending of the file that a model of ``kind`` is kept in."""
+    """Ending of the file of a model of ``kind``."""
     return ".json" if kind == SceneNet.kind else ".safetensors"
 
 
 def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
-    """Write ``model`` to ``path`` (``.json`` for SCENE-Net, ``.safetensors`` for the CNN)."""
+    """Write ``model`` to ``path`` (``.json`` for SCENE-Net, ``.safetensors`` for the CNN).
+
+    Raises:
+        ValueError: the ending of ``path`` is not the one of the model's kind.
+    """
     model = model.at(card.voxel_size)
     head = {
         "format": FORMAT,
@@ -78,7 +83,7 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
         **card.model_dump(),
     }
     if Path(path).suffix != suffix(model.kind):
-        raise ValueError(f"a {model.kind} is kept in *{suffix(model.kind)}, not {path}")
+        raise ValueError(f"the file of a {model.kind} must end in {suffix(model.kind)}, not {path}")
     if isinstance(model, GeneoModel):
         write_json(path, head | _numbers(model))
         return
@@ -90,10 +95,10 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
 
 
 def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
-    """Read a model back.
+    """Read a model file.
 
     Raises:
-        InputError: there is no such file, or it is not a model file this version can read.
+        InputError: the file does not exist, or this version cannot read it.
     """
     path = Path(path)
     if not path.is_file():
@@ -108,12 +113,12 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
         raise InputError(
             f"not a readable model file ({type(error).__name__}: {error})",
             file=path,
-            remedy="Name a .json or .safetensors file that scenenet train has written",
+            remedy="Name a .json or .safetensors file that scenenet train wrote",
         ) from None
 
 
 def _numbers(model: GeneoModel) -> dict[str, Any]:
-    """The parameters of a SCENE-Net as a person would write them down."""
+    """The parameters of a SCENE-Net in a readable form."""
     values = model.shape_parameters()
     geneos = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
@@ -170,14 +175,14 @@ def _read_cnn(path: Path) -> tuple[CNN, ModelCard]:
 def _check_head(data: Mapping[str, Any]) -> None:
     if not isinstance(data, Mapping) or data.get("format") != FORMAT:
         raise InputError(
-            "not a model file of scenenet", remedy="Name a file that scenenet train has written"
+            "not a model file of scenenet", remedy="Name a file that scenenet train wrote"
         )
     readable = (FORMAT_VERSION, FIELD_VERSION, METRIC_VERSION)
     if data["format_version"] not in readable:
         raise InputError(
-            f"model format {data['format_version']}, this version reads "
+            f"model format {data['format_version']}; this version reads formats "
             f"{', '.join(map(str, readable))}",
-            remedy="Use the version of scenenet that wrote it, or train it again",
+            remedy="Use the version of scenenet that wrote it, or train the model again",
         )
 
 

@@ -1,4 +1,4 @@
-"""Probabilities of a model over whole crops, and scores at every threshold."""
+"""Probabilities of a model in crops, and scores at every threshold."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from scenenet.models.base import VoxelModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 
 EVALUATED_AT_ONCE = 8
-"""Crops that are scored together: enough to keep the cores busy, few enough to need no memory."""
+"""Number of crops scored together: enough to keep the cores busy, with little memory."""
 
 
 def threshold_curve(
     model: VoxelModel, samples: Sequence[VoxelSample], measurement: Measurement
 ) -> ThresholdCurve:
-    """Scores at every tau over all voxels of ``samples``, empty ones included."""
+    """Scores at every threshold over all voxels of ``samples``, empty ones included."""
     if isinstance(model, MetricSceneNet):
-        return curve_of(model, scenes_of(model, samples, measurement))
+        return curve_of(model, prepare_crops(model, samples, measurement))
     total = ThresholdCurve.empty()
     with torch.no_grad():
         kernel, bias = model.observer()
@@ -41,11 +41,11 @@ def threshold_curve(
 def probabilities(
     model: VoxelModel, sample: VoxelSample, measurement: Measurement
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Probability (V,) float32 and truth (V,) bool of every voxel of the sample's grid."""
+    """Probability (V,) float32 and labels (V,) bool of every voxel of the sample's grid."""
     if isinstance(model, MetricSceneNet):
-        (scene,) = scenes_of(model, [sample], measurement)
+        (crop,) = prepare_crops(model, [sample], measurement)
         with torch.no_grad():
-            return sample.spread(answers(model, scene))
+            return sample.spread(occupied_probabilities(model, crop))
     occupancy, towers = batch([sample], measurement)
     with torch.no_grad():
         probability = model(occupancy).numpy().reshape(-1)
@@ -55,16 +55,17 @@ def probabilities(
 
 
 @dataclass(frozen=True)
-class Scene:
-    """A crop, ready to be answered many times.
+class PreparedCrop:
+    """A crop with everything that does not depend on the parameters of a SCENE-Net in metres, for
+    repeated predictions.
 
     Attributes:
-        observed: its voxels, or the blocks of them that a fine grid is observed through.
-        voxel_size: m, edge of these.
-        section: the others in the section of each (``scenenet.convolution.cross_section``).
-        row: (M,) the one that each occupied voxel of the crop lies in.
-        tower: (M,) bool, the truth.
-        n_voxels: all voxels of the crop, empty ones included.
+        observed: its voxels, or blocks of voxels if its grid is fine.
+        voxel_size: m, edge of these voxels or blocks.
+        section: the cross-section of each of them (``scenenet.convolution.cross_section``).
+        row: (M,) row in ``observed`` of each occupied voxel of the crop.
+        tower: (M,) bool, which occupied voxels are labelled tower.
+        n_voxels: number of voxels of the crop, empty ones included.
     """
 
     observed: Occupancy
@@ -75,35 +76,35 @@ class Scene:
     n_voxels: int
 
 
-def scenes_of(
+def prepare_crops(
     model: MetricSceneNet, samples: Sequence[VoxelSample], measurement: Measurement
-) -> list[Scene]:
-    """The crops of ``samples`` as ``model`` takes them."""
-    scenes = []
+) -> list[PreparedCrop]:
+    """Prepare ``samples`` for repeated predictions by ``model``."""
+    crops = []
     for sample in samples:
         occupancy, _ = batch([sample], measurement)
         edge = block_edge(sample.grid.voxel_size)
         observed, row = coarsened(occupancy, edge)
         size = edge * sample.grid.voxel_size
         section = model.at(size).section(observed)
-        scenes.append(Scene(observed, size, section, row, sample.tower, sample.grid.n_voxels))
-    return scenes
+        crops.append(PreparedCrop(observed, size, section, row, sample.tower, sample.grid.n_voxels))
+    return crops
 
 
-def answers(model: MetricSceneNet, scene: Scene) -> np.ndarray:
-    """Probability of each occupied voxel, (M,) float32; that of the others is 0."""
-    kernel, _ = model.at(scene.voxel_size).observer()
-    observed = convolve_at_voxels(scene.observed, kernel.detach()[None])[0].numpy()
-    spoken = observed[strongest(observed, *scene.section)]
-    return np.tanh(np.maximum(spoken, 0))[scene.row]
+def occupied_probabilities(model: MetricSceneNet, crop: PreparedCrop) -> np.ndarray:
+    """Probability of each occupied voxel, (M,) float32; empty voxels have probability 0."""
+    kernel, _ = model.at(crop.voxel_size).observer()
+    observed = convolve_at_voxels(crop.observed, kernel.detach()[None])[0].numpy()
+    highest = observed[strongest(observed, *crop.section)]
+    return np.tanh(np.maximum(highest, 0))[crop.row]
 
 
-def curve_of(model: MetricSceneNet, scenes: Sequence[Scene]) -> ThresholdCurve:
-    """Scores at every tau over all voxels, empty ones included."""
+def curve_of(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> ThresholdCurve:
+    """Scores at every threshold over all voxels, empty ones included."""
     total = ThresholdCurve.empty()
     with torch.no_grad():
-        for scene in scenes:
-            curve = ThresholdCurve.of(answers(model, scene), scene.tower)
-            curve.false[0] += scene.n_voxels - len(scene.tower)
+        for crop in crops:
+            curve = ThresholdCurve.of(occupied_probabilities(model, crop), crop.tower)
+            curve.false[0] += crop.n_voxels - len(crop.tower)
             total += curve
     return total

@@ -1,4 +1,4 @@
-"""SCENE-Net as the thesis has it, with kernels in voxels (thesis 4.3)."""
+"""The SCENE-Net of the thesis, with kernels in voxels (thesis 4.3)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from scenenet.models.settings import THESIS_GENEOS, KernelSize
 
 
 class SceneNet(GeneoModel):
-    """A SCENE-Net whose kernels have a fixed number of voxels and whose numbers are free.
+    """A SCENE-Net whose kernels have a fixed number of voxels and unconstrained parameters.
 
-    Nothing but the penalty of the loss keeps a shape parameter or a mixing weight positive (thesis
-    4.5).
+    Only the penalty of the loss keeps shape parameters and mixing weights positive (thesis 4.5).
     """
 
     def __init__(
@@ -34,7 +33,7 @@ class SceneNet(GeneoModel):
             generator: source of the random numbers; torch's default if None.
 
         Raises:
-            InputError: a kernel is unknown, or there is none.
+            InputError: a kernel is unknown, or ``geneos`` is empty.
         """
         super().__init__(geneos, generator)
         self.kernel_size = kernel_size

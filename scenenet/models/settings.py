@@ -1,6 +1,7 @@
-"""The settings of training and tuning (thesis 5.2.1), apart from the code that follows them.
+"""The settings of models, training and tuning (thesis 5.2.1).
 
-They stand by themselves because reading the configuration must not load torch.
+They are separate from the code that uses them, because reading the configuration must not load
+torch.
 """
 
 from __future__ import annotations
@@ -21,71 +22,72 @@ from scenenet.dataset.voxels import Measurement
 Positive = Annotated[int, Field(ge=1)]
 KernelSize = tuple[Positive, Positive, Positive]
 BOOSTED_TREES = "boosted trees"
-"""What tables call the boosted trees of ``scenenet.baselines.boosted_trees``."""
+"""Name in tables of the model of ``scenenet.baselines.boosted_trees``."""
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
-
 
 Protocol = Literal["thesis", "operational"]
 Init = Literal["thesis", "informed", "unranged", "handcrafted"]
-OF_RANGES: tuple[Init, ...] = ("unranged", "handcrafted")
-"""Starts that say something of ranges, which a CNN does not have."""
+GENEO_INITS: tuple[Init, ...] = ("unranged", "handcrafted")
+"""Initialisations that only a SCENE-Net has, because a CNN has no parameter ranges."""
 
 
 class MetricSettings(Settings):
-    """A SCENE-Net in metres. None of these is trained; docs/method/operational_protocol.md gives
-    the reason of each."""
+    """The fixed lengths and rules of a SCENE-Net in metres. docs/method/operational_protocol.md
+    gives the reasons."""
 
-    radius: float = Field(3.0, gt=0, description="m, how far the kernels reach in plan")
-    above: float = Field(6.0, ge=0, description="m, how far they reach up")
-    below: float = Field(6.0, ge=0, description="m, how far they reach down")
+    radius: float = Field(3.0, gt=0, description="m, horizontal reach of the kernels")
+    above: float = Field(6.0, ge=0, description="m, upward reach of the kernels")
+    below: float = Field(6.0, ge=0, description="m, downward reach of the kernels")
     section_radius: float = Field(
         2.1,
         ge=0,
-        description="m, half the mean width of a tower (thesis 5.1.2): a voxel is as much tower "
-        "as the one that is most so within this distance in plan",
+        description="m, radius of the cross-section from which a voxel takes the strongest "
+        "response; half the mean width of a tower (thesis 5.1.2)",
     )
     section_above: float = Field(
-        2.0, ge=0, description="m, the same upwards, as a tower's foot has ground about it"
+        2.0,
+        ge=0,
+        description="m, height of the cross-section above the voxel; only upwards, because the "
+        "foot of a tower is surrounded by ground",
     )
     false_weight: float = Field(
         2.0,
         gt=0,
-        description="weight of a false voxel in the F0.5 that numbers and tau are chosen by: what "
-        "is right on the crops at hand is too bold elsewhere",
+        description="weight of a false positive voxel in the F0.5 that selects parameters and tau; "
+        "above 1 because models find more false positives on other data than on their training "
+        "crops",
     )
     whole_towers: bool = Field(
         True,
-        description="a voxel is called a tower's where it belongs to a tower that is found, body "
-        "and all (docs/method/detection.md); false for where it reaches tau, as in the thesis",
+        description="predict all voxels of detected towers, bodies included "
+        "(docs/method/detection.md); false predicts the voxels at or above tau, as in the thesis",
     )
 
 
 class SearchSettings(Settings):
-    """How the eleven numbers of a SCENE-Net in metres are found."""
+    """The search for the parameters of a SCENE-Net in metres."""
 
-    searches: int = Field(
-        4, ge=1, description="searches that are begun; the best of them is gone on with"
-    )
-    trial: int = Field(15, ge=0, description="generations after which the best is chosen")
+    searches: int = Field(4, ge=1, description="searches started; only the best continues")
+    trial: int = Field(15, ge=0, description="generations after which the best search is chosen")
     starts: int = Field(
-        64, ge=1, description="numbers drawn at first for each; it begins at the best of them"
+        64, ge=1, description="random initial points of each search, which starts at the best one"
     )
-    population: int = Field(14, ge=4, description="numbers tried in a generation")
-    generations: int = Field(60, ge=1, description="steps of a search, the trial among them")
-    step: float = Field(0.7, gt=0, description="first step size, in units of the logit")
+    population: int = Field(14, ge=4, description="candidates per generation")
+    generations: int = Field(60, ge=1, description="generations of a search, trial included")
+    step: float = Field(0.7, gt=0, description="initial step size, in units of the logit")
 
 
 class LossSettings(Settings):
-    """The GENEO loss (thesis 4.5), and what was tried in its stead (5.3.3)."""
+    """The GENEO loss (thesis 4.5) and its alternatives (5.3.3)."""
 
     fidelity: Literal["squared", "cross_entropy"] = Field(
         "squared",
-        description="how far an answer is from the truth: squared error (thesis 4.5), or cross "
-        "entropy with the same weights (5.3.3)",
+        description="difference between probability and label: squared error (thesis 4.5), or "
+        "cross entropy with the same weights (5.3.3)",
     )
     penalty: Literal["linear", "quadratic"] = Field(
         "linear",
-        description="h(x) of a negative number: -x (thesis Figure 4.5), or x^2 as at first (5.3.3)",
+        description="h(x) of a negative parameter: -x (thesis Figure 4.5), or x^2 (5.3.3)",
     )
     alpha: float = Field(5.0, ge=0, description="emphasis of the weighting scheme f_w")
     epsilon: float = Field(0.1, gt=0, description="smallest weight before normalisation")
@@ -94,23 +96,24 @@ class LossSettings(Settings):
 
 
 class TrainingSettings(Settings):
-    """How a model is trained."""
+    """Training by gradient."""
 
     init: Init = Field(
         "thesis",
-        description="thesis: numbers drawn once; informed: the best of many draws on the training "
-        "crops, and for a CNN Fisher's discriminant of tower voxels' surroundings and others'; "
-        "for a SCENE-Net also (thesis 5.3.4) unranged: drawn from N(0, 1), ranges or not, and "
-        "handcrafted: the values that stand beside each kernel, the same for every seed",
+        description="initial model. thesis: drawn once from the ranges of the parameters; "
+        "informed: the best of many draws on the training crops, and for a CNN Fisher's "
+        "discriminant between the surroundings of tower voxels and other voxels. Only for a "
+        "SCENE-Net (thesis 5.3.4): unranged: drawn from N(0, 1); handcrafted: values chosen by "
+        "hand, the same for every seed",
     )
     epochs: int = Field(50, ge=1, description="passes over the training set")
-    batch_size: int = Field(8, ge=1, description="crops a step")
+    batch_size: int = Field(8, ge=1, description="crops per step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
     learning_rate: float = Field(0.001, gt=0, description="step size of the optimiser")
     decay: float = Field(
-        0.0, ge=0, lt=1, description="share that the learning rate loses every so often (5.3.4)"
+        0.0, ge=0, lt=1, description="share by which the learning rate decreases (5.3.4)"
     )
-    decay_every: int = Field(10, ge=1, description="epochs from one such loss to the next")
+    decay_every: int = Field(10, ge=1, description="epochs between two decreases")
     loss: LossSettings = LossSettings()
 
     @model_validator(mode="before")
@@ -130,7 +133,7 @@ UNUSED: Mapping[str, tuple[str, ...]] = {
     "thesis": ("metric", "search", "n_kernels"),
     "operational": ("training", "kernel_size", "n_kernels"),
 }
-"""Settings that change nothing, for a CNN and for a SCENE-Net of each protocol."""
+"""Settings without effect, for a CNN and for a SCENE-Net of each protocol."""
 
 
 def unused_settings(raw: Mapping[str, Any]) -> tuple[str, ...]:
@@ -139,14 +142,14 @@ def unused_settings(raw: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 class ModelSettings(Settings):
-    """One architecture and the protocol it is trained by."""
+    """An architecture and the protocol of its training."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$", description="name in results and tables")
     kind: Literal["scenenet", "cnn"] = Field(description="architecture")
     protocol: Protocol = Field(
         "thesis",
         description="thesis: kernels in voxels, trained by gradient (thesis 5.2.1); operational: "
-        "a SCENE-Net in metres, searched for, for use on real surveys "
+        "a SCENE-Net with kernels in metres, found by a search, for real surveys "
         "(docs/method/operational_protocol.md)",
     )
     metric: MetricSettings = MetricSettings()
@@ -181,7 +184,7 @@ class ModelSettings(Settings):
 
     @model_serializer(mode="wrap")
     def _effective(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Only what has an effect, so that records of a model do not name anything else."""
+        """Only the settings with an effect, so that records of a model contain no others."""
         raw = dump(self)
         return {name: raw[name] for name in raw if name not in unused_settings(raw)}
 
@@ -191,19 +194,20 @@ class ModelSettings(Settings):
         return {name: raw[name] for name in raw if name in changed or name not in unused}
 
     @model_validator(mode="after")
-    def _start_fits(self) -> Self:
-        if self.kind == "cnn" and self.training.init in OF_RANGES:
+    def _init_fits(self) -> Self:
+        if self.kind == "cnn" and self.training.init in GENEO_INITS:
             raise ValueError(
-                f"training.init {self.training.init} is for a SCENE-Net; a CNN has no ranges"
+                f"training.init {self.training.init} is for a SCENE-Net; a CNN has no parameter "
+                "ranges"
             )
         return self
 
 
 class TuningSettings(Settings):
-    """What is chosen on the validation part, by F0.5 (thesis 5.2.7)."""
+    """Choices on the validation part, by F0.5 (thesis 5.2.7)."""
 
     kernel_sizes: tuple[KernelSize, ...] = Field(
         (),
-        description="further sizes (kz, ky, kx) that the kernels of a SCENE-Net are sampled at; "
-        "the size it was trained with is always tried, and a CNN has no other",
+        description="further sizes (kz, ky, kx) at which the kernels of a SCENE-Net are sampled; "
+        "the size of the training is always tried, and a CNN has no other",
     )

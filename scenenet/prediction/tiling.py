@@ -1,7 +1,7 @@
-"""A survey as tiles of voxels on disk, so that its length does not matter.
+"""A survey as tiles of voxels on disk, so that memory does not limit its length.
 
-The voxels of all surveys lie on one lattice: voxel (i, j, k) covers [i, i + 1) * voxel_size in map
-coordinates. What a tile answers is therefore the same wherever a survey was cut off.
+The voxels of all surveys are on one lattice: voxel (i, j, k) covers [i, i + 1) * voxel_size in map
+coordinates. The prediction of a tile is therefore the same wherever a survey is cut.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from scenenet.core.errors import InputError
 
 EDGE = 64
-"""Voxels along the edge of a tile: a tile and its halo fit a processor's cache."""
+"""Voxels along the edge of a tile; a tile and its halo fit into a processor's cache."""
 
 _BITS = 21
 _BIAS = 1 << (_BITS - 1)
@@ -30,7 +30,7 @@ class Tile:
     Attributes:
         place: (z, y, x) number of the tile.
         voxel: (M,) int32 flat C-order [z, y, x] positions within the tile, ascending.
-        count: (M,) int32 points in each.
+        count: (M,) int32 number of points in each voxel.
     """
 
     place: tuple[int, int, int]
@@ -44,7 +44,7 @@ class Tile:
 
 
 class TileSpool:
-    """The occupied voxels of a survey, one file a tile."""
+    """The occupied voxels of a survey, one file per tile."""
 
     def __init__(self, folder: Path, voxel_size: float) -> None:
         """Start an empty spool.
@@ -58,10 +58,10 @@ class TileSpool:
         self._codes: set[int] = set()
 
     def add(self, xyz: np.ndarray) -> None:
-        """Count points (n, 3) m into their voxels.
+        """Add points (n, 3) m to the counts of their voxels.
 
         Raises:
-            InputError: a coordinate is too far out for the lattice.
+            InputError: a coordinate is outside the lattice.
         """
         codes, voxels = self.locate(xyz)
         for code, rows in groups(codes):
@@ -73,12 +73,16 @@ class TileSpool:
             self._codes.add(code)
 
     def locate(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Code of the tile and position in it, (n,) int64 and (n,) int32, of points (n, 3) m."""
+        """Tile code (n,) int64 and position in the tile (n,) int32 of points (n, 3) m.
+
+        Raises:
+            InputError: a coordinate is outside the lattice.
+        """
         steps = np.floor(xyz[:, ::-1] / self.voxel_size)
         if not (np.abs(steps) < _BIAS * EDGE).all():
             row = int(np.argmax(~(np.abs(steps) < _BIAS * EDGE).all(axis=1)))
             raise InputError(
-                f"a point at {xyz[row].tolist()} lies too far out for voxels of "
+                f"the point {xyz[row].tolist()} is too far from the origin for voxels of "
                 f"{self.voxel_size:g} m",
                 remedy="Remove stray points, or convert the survey to metres",
             )
@@ -101,7 +105,7 @@ class TileSpool:
         return [(code, _decode(code)) for code in sorted(self._codes)]
 
     def tile(self, code: int) -> Tile:
-        """The tile with ``code``; without voxels where there is none."""
+        """The tile with ``code``; a tile without voxels if it holds no point."""
         place = _decode(code)
         if code not in self._codes:
             return Tile(place, np.empty(0, np.int32), np.empty(0, np.int32))
@@ -114,8 +118,8 @@ class TileSpool:
         """A tile together with its neighbours up to ``reach`` (z, y, x) voxels away.
 
         Returns:
-            a ``Tile`` whose ``voxel`` are positions in a volume of EDGE + 2 * reach voxels, halo
-            included.
+            a ``Tile`` whose ``voxel`` are positions in a volume of EDGE + 2 * reach voxels, which
+            includes the halo.
 
         Raises:
             ValueError: the reach is larger than a tile.
@@ -140,7 +144,7 @@ class TileSpool:
         return Tile(place, index[order].astype(np.int32), count[order])
 
     def centres(self, zyx: np.ndarray) -> np.ndarray:
-        """(M, 3) xyz, m, of the middle of voxels (M, 3) on the lattice."""
+        """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
         return (zyx[:, ::-1] + 0.5) * self.voxel_size
 
     def _path(self, code: int) -> Path:
@@ -153,7 +157,7 @@ def code_of(place: tuple[int, int, int]) -> int:
 
 
 def groups(codes: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
-    """Each code in (n,) with the rows that have it."""
+    """Each distinct code in ``codes`` (n,), with its rows."""
     order = np.argsort(codes, kind="stable")
     borders = np.flatnonzero(np.diff(codes[order])) + 1
     for rows in np.split(order, borders) if len(order) else []:

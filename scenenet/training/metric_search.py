@@ -17,7 +17,7 @@ from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.models.factory import new_model
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.predictions import Scene, curve_of, scenes_of
+from scenenet.models.predictions import PreparedCrop, curve_of, prepare_crops
 from scenenet.models.settings import ModelSettings, SearchSettings
 from scenenet.training.cma_es import Score, State, advance, begin, settled
 from scenenet.training.objective import draws, scorer
@@ -43,8 +43,8 @@ def search_metric(
     """
     model = new_model(settings, seed)
     assert isinstance(model, MetricSceneNet)
-    learnt = scenes_of(model, training, settings.measurement)
-    kept = scenes_of(model, validation, settings.measurement)
+    learnt = prepare_crops(model, training, settings.measurement)
+    kept = prepare_crops(model, validation, settings.measurement)
     score = scorer(model, learnt)
     search = settings.search
 
@@ -93,7 +93,7 @@ def _trial(
 
 
 def _row(
-    model: MetricSceneNet, state: State, kept: Sequence[Scene], seconds: float
+    model: MetricSceneNet, state: State, kept: Sequence[PreparedCrop], seconds: float
 ) -> dict[str, float]:
     loss = 1 - state.best_score
     row = {"epoch": state.generation, "loss": loss, "fidelity": loss, "penalty": 0.0}

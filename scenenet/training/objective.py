@@ -14,16 +14,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.predictions import Scene, curve_of
+from scenenet.models.predictions import PreparedCrop, curve_of
 from scenenet.training.cma_es import Score
 
 
-def scorer(model: MetricSceneNet, scenes: Sequence[Scene]) -> Score:
+def scorer(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> Score:
     """Scores a set of numbers by the weighted F0.5 at its own best tau."""
 
     def score(numbers: np.ndarray) -> float:
         model.set_numbers(numbers)
-        return model.best_step(curve_of(model, scenes))[1]
+        return model.best_step(curve_of(model, crops))[1]
 
     return score
 

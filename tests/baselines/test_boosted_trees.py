@@ -119,7 +119,7 @@ def test_crops_without_a_tower_teach_nothing(crops):
     full = [replace(crop, tower=np.ones(len(crop.index), bool)) for crop in crops]
     with pytest.raises(InputError, match="have only tower voxels"):
         fit(full, FEW, 0)
-    with pytest.raises(InputError, match="in the 0 training crops"):
+    with pytest.raises(InputError, match="the 0 training crops have no tower voxel"):
         fit([], FEW, 0)
 
 

@@ -241,5 +241,5 @@ def test_of_two_axes_of_a_tower_the_one_that_stands_free_is_its_own(lattice, pol
     [right] = detect(upper(body), lattice.together(lattice.ground(), around))
     wrong = replace(right, x=right.x + 3, height=right.height + 1, free=0.7)
     detected = detection._Detected(upper(body), np.full(10, 0.9), 1.0)
-    [kept] = detection._one_of_each([wrong, right], detected, DetectionSettings())
+    [kept] = detection._without_duplicates([wrong, right], detected, DetectionSettings())
     assert (kept.x, kept.height) == (right.x, right.height)

@@ -284,7 +284,7 @@ def test_a_stray_point_far_out_is_named_and_nothing_is_written(scene, model, tmp
     cloud = scene()
     xyz = np.concatenate([cloud.xyz, [[5e8, 0, 0]]])
     np.save(tmp_path / "stray.npy", np.column_stack([xyz, np.full(len(xyz), 2.0)]))
-    with pytest.raises(InputError, match="too far out"):
+    with pytest.raises(InputError, match="too far from the origin"):
         predict(tmp_path / "stray.npy", model, tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
 

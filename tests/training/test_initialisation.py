@@ -111,5 +111,5 @@ def test_values_by_hand_lie_in_their_ranges_and_are_the_same_for_every_seed(toys
 
 @pytest.mark.parametrize("init", ["unranged", "handcrafted"])
 def test_a_cnn_has_no_ranges_to_leave(init):
-    with pytest.raises(ValueError, match=r"training.init .* a CNN has no ranges"):
+    with pytest.raises(ValueError, match=r"training.init .* a CNN has no parameter ranges"):
         settings("cnn", init)

@@ -12,7 +12,12 @@ from scenenet.metrics.threshold_choice import STEPS, best_step
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.metrics.voxel_scores import confusion
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.predictions import answers, curve_of, probabilities, scenes_of
+from scenenet.models.predictions import (
+    curve_of,
+    occupied_probabilities,
+    prepare_crops,
+    probabilities,
+)
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings
 from scenenet.training.cma_es import NEAR_BEST, advance, begin, settled
@@ -97,9 +102,9 @@ def test_scenes_are_answered_as_the_model_does(scene, voxel_size):
     cloud = scene(size=(16, 16), poles=((8.5, 8.5),), tree=(3, 3))
     sample = voxelise(cloud, VoxelGrid.metric(cloud.xyz, voxel_size))
     net = model(3)
-    (ready,) = scenes_of(net, [sample], "presence")
+    (ready,) = prepare_crops(net, [sample], "presence")
     assert ready.voxel_size == 1.0
-    occupied = answers(net, ready)
+    occupied = occupied_probabilities(net, ready)
     probability, truth = probabilities(net, sample, "presence")
     np.testing.assert_array_equal(probability[sample.index], occupied)
     assert probability.sum() == pytest.approx(occupied.sum(), rel=1e-5)

@@ -82,7 +82,7 @@ def test_changes_go_where_they_belong_and_common_ones_to_all():
         ({"split.train": 0.9}, "sum to 1"),
         ({"applied.tau": 0.5}, "applied.tau"),
         ({"voxels.resolution": 48}, "resolution"),
-        ({"kind": "cnn", "training.init": "unranged"}, "a CNN has no ranges"),
+        ({"kind": "cnn", "training.init": "unranged"}, "a CNN has no parameter ranges"),
     ],
 )
 def test_a_change_that_cannot_be_is_named(changes, named):

@@ -105,7 +105,7 @@ def _put(value, *keys):
     ("change", "message"),
     [
         (_put("other", "format"), "not a model file of scenenet"),
-        (_put(99, "format_version"), "model format 99, this version reads 1"),
+        (_put(99, "format_version"), "model format 99; this version reads formats 1"),
         (_drop("kernel_size"), "not a readable model file .KeyError"),
         (_drop("voxel_size"), "not a readable model file"),
         (_put(-1.0, "voxel_size"), "not a readable model file"),

@@ -39,7 +39,7 @@ class Statement:
         thesis: where the thesis claims it.
         holds: whether the model has it.
         text: the finding in words.
-        value: number that belongs to it; None where there is none.
+        value: number that supports it; None if there is none.
     """
 
     property: str
@@ -56,9 +56,9 @@ class ModelCertificate:
     Attributes:
         model, seed, kind: name, seed and architecture of the model.
         voxel_size: m, at which it was measured.
-        scene: what it was measured on.
-        half_voxel: the scene shifted by half a voxel along x and y.
-        turns: the scene rotated about z.
+        scene: describes the scene of the measurement.
+        half_voxel: differences after a shift by half a voxel along x and y.
+        turns: differences after rotations about z.
         statements: the properties that were verified.
         numbers: the other attributes of ``scenenet.interpretability.geneo_properties.Certificate``,
             by name, plain.
@@ -75,7 +75,7 @@ class ModelCertificate:
     numbers: Mapping[str, Any]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values; ``numbers`` stand beside the other attributes."""
+        """Plain values; ``numbers`` are merged with the other attributes."""
         values = asdict(self)
         numbers = values.pop("numbers")
         lists = {name: list(values.pop(name)) for name in ("turns", "statements")}
@@ -83,10 +83,10 @@ class ModelCertificate:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> ModelCertificate:
-        """The certificate that ``to_json`` gave.
+        """The certificate from the result of ``to_json``.
 
         Raises:
-            KeyError, TypeError: a value is missing, or there is an unknown one.
+            KeyError, TypeError: a value is missing or unknown.
         """
         plain = {name: data[name] for name in ("model", "seed", "kind", "voxel_size", "scene")}
         typed = {

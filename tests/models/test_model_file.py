@@ -163,7 +163,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path):
 
 def test_each_kind_has_its_suffix(tmp_path):
     assert (suffix("scenenet"), suffix("cnn")) == (".json", ".safetensors")
-    with pytest.raises(ValueError, match="is kept in"):
+    with pytest.raises(ValueError, match="must end in"):
         write_model(tmp_path / "m.json", CNN(), CARD)
     assert not (tmp_path / "m.json").exists()
 

@@ -12,6 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenenet.core.files import write_json
+from scenenet.figures.plots.style import (
+    BACKGROUND_COLOUR,
+    CONTRIBUTION_COLOURS,
+    OUTCOME_COLOURS,
+    TOWER_COLOUR,
+)
 from scenenet.pointcloud.class_schemes import ROLE_COLOURS
 from scenenet.results.folder import Results
 
@@ -23,6 +29,15 @@ if TYPE_CHECKING:
 
 CLASSES = tuple(reversed(tuple(ROLE_COLOURS)))
 """Class of a voxel: the last of these that any of its points has."""
+
+PALETTE: dict[str, Any] = {
+    "class": dict(ROLE_COLOURS),
+    "outcome": OUTCOME_COLOURS | {"true negative": BACKGROUND_COLOUR},
+    "probability": (BACKGROUND_COLOUR, TOWER_COLOUR),
+    "contribution": CONTRIBUTION_COLOURS,
+}
+"""Colours of the 3D view: of classes and outcomes by name; of probabilities from 0 to 1; of
+contributions of -100 %, 0 and 100 %."""
 
 
 def write_scene(

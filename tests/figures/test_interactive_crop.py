@@ -1,16 +1,18 @@
-"""A crop for the page holds what its evaluation says of it."""
+"""The data of an interactive crop agree with the evaluation of the crop."""
 
 from __future__ import annotations
 
 import base64
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from scenenet.figures.interactive_crop import CLASSES, write_scene
+from scenenet.figures.interactive_crop import CLASSES, PALETTE, write_scene
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
+from scenenet.report import page
 from scenenet.results.folder import Results
 
 
@@ -24,7 +26,7 @@ def scene(results: Results, tmp_path: Path) -> dict:
     return json.loads((tmp_path / "median.json").read_text())
 
 
-def test_every_voxel_has_a_place_a_class_and_a_part_of_each_operator(scene):
+def test_every_voxel_has_a_position_a_class_and_a_share_of_each_kernel(scene):
     tower = decoded(scene["tower"], "<u1")
     classes = decoded(scene["class"], "<u1")
     assert len(decoded(scene["zyx"], "<i2")) == 3 * len(tower)
@@ -47,9 +49,17 @@ def test_the_counts_are_those_of_the_whole_grid(scene):
     assert len(scene["taus"]) == len(THRESHOLDS)
 
 
-def test_whole_towers_score_what_their_voxels_say(scene):
+def test_scores_of_whole_towers_follow_from_their_voxels(scene):
     tower, whole = (decoded(scene[name], "<u1") > 0 for name in ("tower", "whole"))
     tp, fp = (whole & tower).sum(), (whole & ~tower).sum()
     assert whole.any()
     assert scene["whole_scores"]["precision"] == pytest.approx(tp / (tp + fp))
     assert scene["whole_scores"]["recall"] == pytest.approx(tp / tower.sum())
+
+
+def test_the_view_has_no_colours_but_those_of_the_palette():
+    assert set(PALETTE["class"]) == set(CLASSES)
+    script = (page.ASSETS / "page.js").read_text(encoding="utf-8")
+    used = set(re.findall(r"palette\.(\w+)", script))
+    assert used == set(PALETTE)
+    assert not re.search(r"#[0-9a-fA-F]{3,8}\b|rgb\(\d", script)

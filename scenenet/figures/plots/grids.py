@@ -9,16 +9,20 @@ from typing import NamedTuple
 import numpy as np
 
 from scenenet.figures.plots.point_clouds import principal_axes
-from scenenet.figures.plots.style import TOWER_COLOUR, new_figure, save
+from scenenet.figures.plots.style import (
+    BACKGROUND_COLOUR,
+    OUTCOME_COLOURS,
+    TOWER_COLOUR,
+    new_figure,
+    save,
+)
 
 PANEL = 3.4
 """Inches, width of a panel."""
 
-QUIET = "#B5BAC1"
-FOUND = {"false positive": (True, False, "#E69F00"), "true positive": (True, True, "#009E73"),
-         "false negative": (False, True, "#CC79A7")}  # fmt: skip
-"""Outcome -> predicted, labelled, colour, as in the interactive crops; later ones are drawn over
-earlier ones."""
+OUTCOMES = {"false positive": (True, False), "true positive": (True, True),
+            "false negative": (False, True)}  # fmt: skip
+"""Outcome -> predicted, labelled; later ones are drawn over earlier ones."""
 
 
 class GridView(NamedTuple):
@@ -69,16 +73,16 @@ def labels_and_predictions(views: Sequence[GridView], tau: float, out: str | Pat
         size = (72 * 0.85 * PANEL * view.size / (right - left)) ** 2
         style = {"s": size, "marker": "s", "lw": 0, "rasterized": True}
         predicted = view.probability >= tau
-        row[0].scatter(*side[:, ~view.tower], c=QUIET, **style)
+        row[0].scatter(*side[:, ~view.tower], c=BACKGROUND_COLOUR, **style)
         row[0].scatter(*side[:, view.tower], c=TOWER_COLOUR, **style)
         # The most probable last, so that no other voxel hides them.
         order = np.argsort(view.probability, kind="stable")
         shown = row[1].scatter(*side[:, order], c=view.probability[order], cmap="viridis",
                                vmin=0, vmax=1, **style)  # fmt: skip
-        row[2].scatter(*side[:, ~view.tower & ~predicted], c=QUIET, **style)
-        for name, (detected, labelled, colour) in FOUND.items():
+        row[2].scatter(*side[:, ~view.tower & ~predicted], c=BACKGROUND_COLOUR, **style)
+        for name, (detected, labelled) in OUTCOMES.items():
             member = (predicted == detected) & (view.tower == labelled)
-            row[2].scatter(*side[:, member], c=colour, label=name, **style)
+            row[2].scatter(*side[:, member], c=OUTCOME_COLOURS[name], label=name, **style)
         row[0].set(ylabel="height [m]", xlim=(left, right), ylim=(low, high))
         for axis, title in zip(row, ("labelled tower", "probability", f"at tau {tau:.3f}"),
                                strict=True):  # fmt: skip
@@ -89,7 +93,7 @@ def labels_and_predictions(views: Sequence[GridView], tau: float, out: str | Pat
     if shown is not None:
         figure.colorbar(shown, ax=axes[:, 2], label="probability", shrink=0.6, aspect=30)
     handles, labels = axes[0, 2].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(FOUND), frameon=False,
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(OUTCOMES), frameon=False,
                   fontsize=9)  # fmt: skip
     save(figure, out)
     counts = "; ".join(

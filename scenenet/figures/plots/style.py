@@ -20,6 +20,14 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6
 """Distinguishable for colour-blind readers (Okabe and Ito)."""
 
 TOWER_COLOUR = ROLE_COLOURS["tower"]
+BACKGROUND_COLOUR = ROLE_COLOURS["other"]
+OUTCOME_COLOURS = {
+    "false positive": COLOURS[4],
+    "true positive": COLOURS[2],
+    "false negative": COLOURS[3],
+}
+CONTRIBUTION_COLOURS = ("#2166AC", "#E1E1E1", "#B2182B")
+"""Of a contribution of -100 %, 0 and 100 %, as in the colour map RdBu of the kernels."""
 
 
 def new_figure(

@@ -1,7 +1,7 @@
 "use strict";
 
-// Tables sort by the column whose heading is pressed: numbers by value, all else by letter, what is
-// not there last.
+// A click on a heading sorts the table by its column: numbers by value, text alphabetically, missing
+// values last.
 for (const table of document.querySelectorAll("table")) {
   const body = table.tBodies[0];
   table.querySelectorAll("thead button").forEach((button, column) => {
@@ -27,20 +27,20 @@ for (const table of document.querySelectorAll("table")) {
   });
 }
 
-const CLASS_COLOURS = { other: "#9aa5b1", ground: "#b08d57", vegetation: "#4c9a4c", conductor: "#0072b2", tower: "#d62728" };
-const FOUND_COLOURS = { right: "#009e73", wrong: "#e69f00", missed: "#cc79a7", nothing: "#9aa5b133" };
-
+// A typed array of class Kind from base64.
 function unpack(text, Kind) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   return new Kind(bytes.buffer);
 }
 
+// The colour at a share from 0 to 1 between two colours #rrggbb.
 function mix(low, high, share) {
-  const part = (i) => Math.round(low[i] + (high[i] - low[i]) * share);
+  const channel = (colour, i) => parseInt(colour.slice(1 + 2 * i, 3 + 2 * i), 16);
+  const part = (i) => Math.round(channel(low, i) + (channel(high, i) - channel(low, i)) * share);
   return `rgb(${part(0)},${part(1)},${part(2)})`;
 }
 
-// A crop that turns in the hand: voxels as squares, the nearest drawn last.
+// A crop in 3D that the reader can rotate: voxels as squares, the nearest drawn last.
 class Scene {
   constructor(figure) {
     const data = JSON.parse(figure.querySelector("script").textContent);
@@ -48,7 +48,7 @@ class Scene {
     this.canvas = figure.querySelector("canvas");
     this.colour = figure.querySelector("select");
     this.slider = figure.querySelector("input");
-    this.said = figure.querySelector("output");
+    this.scores = figure.querySelector("output");
     this.zyx = unpack(data.zyx, Int16Array);
     this.classes = unpack(data.class, Uint8Array);
     this.steps = unpack(data.steps, Uint16Array);
@@ -71,7 +71,7 @@ class Scene {
     });
     this.slider.max = data.taus.length - 1;
     this.slider.value = data.tau_step;
-    this.slider.addEventListener("input", () => { this.tell(); this.draw(); });
+    this.slider.addEventListener("input", () => { this.showScores(); this.draw(); });
     this.colour.addEventListener("change", () => this.draw());
     this.canvas.addEventListener("pointerdown", (event) => this.canvas.setPointerCapture(event.pointerId));
     this.canvas.addEventListener("pointermove", (event) => {
@@ -90,11 +90,11 @@ class Scene {
       this.draw();
     });
     new ResizeObserver(() => this.draw()).observe(this.canvas);
-    this.tell();
+    this.showScores();
   }
 
-  // Precision and recall over all voxels of the grid, empty ones included, from the counts.
-  tell() {
+  // Precision, recall and F0.5 at tau over all voxels of the grid, empty ones included.
+  showScores() {
     const step = Number(this.slider.value);
     const above = (counts) => counts.slice(step + 1).reduce((sum, count) => sum + count, 0);
     const found = above(this.data.true), wrong = above(this.data.false);
@@ -103,27 +103,34 @@ class Scene {
     const recall = all ? found / all : 0;
     const low = 0.25 * precision + recall;
     const f05 = low ? (1.25 * precision * recall) / low : 0;
-    this.said.textContent = `tau ${this.data.taus[step]}: precision ${precision.toFixed(3)}, ` +
+    this.scores.textContent = `tau ${this.data.taus[step]}: precision ${precision.toFixed(3)}, ` +
       `recall ${recall.toFixed(3)}, F0.5 ${f05.toFixed(3)}`;
   }
 
+  // A function from the number of a voxel to its colour, for the selected colouring.
   colours() {
     const what = this.colour.value, step = Number(this.slider.value), n = this.data.taus.length;
+    const palette = this.data.palette;
     if (what === "class") {
-      const named = this.data.classes.map((name) => CLASS_COLOURS[name]);
+      const named = this.data.classes.map((name) => palette.class[name]);
       return (i) => named[this.classes[i]];
     }
-    if (what === "probability") return (i) => mix([200, 206, 212], [214, 39, 40], Math.min(1, this.steps[i] / n));
+    if (what === "probability") {
+      const [low, high] = palette.probability;
+      return (i) => mix(low, high, Math.min(1, this.steps[i] / n));
+    }
     if (what === "found" || what === "whole") {
-      const said = what === "whole" ? (i) => this.whole[i] : (i) => this.steps[i] > step;
+      const predicted = what === "whole" ? (i) => this.whole[i] : (i) => this.steps[i] > step;
+      const outcome = palette.outcome;
+      const transparent = outcome["true negative"] + "33";
       return (i) => {
-        if (said(i)) return this.tower[i] ? FOUND_COLOURS.right : FOUND_COLOURS.wrong;
-        return this.tower[i] ? FOUND_COLOURS.missed : FOUND_COLOURS.nothing;
+        if (predicted(i)) return this.tower[i] ? outcome["true positive"] : outcome["false positive"];
+        return this.tower[i] ? outcome["false negative"] : transparent;
       };
     }
     const share = this.shares[what];
-    return (i) => share[i] < 0 ? mix([225, 225, 225], [33, 102, 172], -share[i] / 100)
-      : mix([225, 225, 225], [178, 24, 43], share[i] / 100);
+    const [negative, zero, positive] = palette.contribution;
+    return (i) => mix(zero, share[i] < 0 ? negative : positive, Math.abs(share[i]) / 100);
   }
 
   draw() {

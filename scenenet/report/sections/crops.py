@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from scenenet.figures import CROP_RANKS
+from scenenet.figures.interactive_crop import PALETTE
 from scenenet.report.blocks import Block, Column, Scene, Section, Text, table
 from scenenet.report.context import VOXEL_SCORES, ReportContext, with_published
 
@@ -67,7 +68,7 @@ def _scenes(context: ReportContext) -> list[Block]:
                 f"{whole['recall']:.3f}, F0.5 {whole['f05']:.3f}.",
                 f"The occupied voxels of crop {data['crop']} in space.",
                 [*kinds, *geneos],
-                data,
+                {**data, "palette": PALETTE},
             )
         )
     return made

@@ -260,7 +260,7 @@ def chain(scene, tmp_path_factory: pytest.TempPathFactory) -> Chain:
     files = Chain(*(folder / n for n in ("s.laz", "crops.json", "voxels.json", "split.csv")))
     poles = [(20.5 + 60 * i, 20.5) for i in range(6)]
     write_las(files.survey, scene(poles, size=(345.0, 40.0), tree=(30.0, 30.0)))
-    towers = survey_towers(files.survey, "edp", TowerSettings(min_points=100))
+    towers = survey_towers(files.survey, "edp", TowerSettings(min_points=100)).towers
     store = folder / "crops.zarr.zip"
     cut_crops("s", files.survey, "edp", towers, CropSettings(), store, files.crops)
     settings = VoxelSettings(fit="metric", voxel_size=1.0)

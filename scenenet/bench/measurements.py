@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import platform
-import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +20,7 @@ from scenenet.convolution.convolve import convolution_gradient, convolve
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.progress import track
 from scenenet.core.provenance import package_version
+from scenenet.core.scratch import scratch_folder
 from scenenet.core.settings import Settings
 from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings, voxelise
@@ -239,10 +239,10 @@ def survey() -> dict[str, Any]:
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.model_file import ModelCard, write_model
     from scenenet.prediction.settings import PredictSettings
-    from scenenet.prediction.writers import predict_to_files
+    from scenenet.prediction.writers import PredictionFiles, predict_to_files
     from scenenet.synthetic import SyntheticSettings, make_survey
 
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
+    with scratch_folder() as scratch:
         folder = Path(scratch)
         source = folder / "line.laz"
         points = make_survey(SyntheticSettings(towers=30, seed=0), source)["points"]
@@ -255,8 +255,8 @@ def survey() -> dict[str, Any]:
         settings = PredictSettings()
 
         def ours() -> None:
-            out = (folder / "out.laz", folder / "out.geojson", folder / "out.json")
-            predict_to_files(source, folder / "model.json", *out, settings, DetectionSettings())
+            out = PredictionFiles.of(source, folder / "out")
+            predict_to_files(source, folder / "model.json", out, settings, DetectionSettings())
 
         def laspy_alone() -> None:
             peers.read_and_write(source, folder / "copy.laz", settings.chunk_points)

@@ -14,9 +14,7 @@ import typer
 
 from scenenet.cli.commands import bench, check, evaluate, explain, predict, synth, train
 from scenenet.core.errors import InputError
-
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as in shells: 128 plus the number of the signal."""
+from scenenet.core.interrupts import ENDING, end_cleanly_on_signals
 
 COMMANDS = {
     "check": check,
@@ -62,12 +60,13 @@ def _of_every_command(
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line; faulty input ends with its message and exit code 1."""
+    end_cleanly_on_signals()
     try:
         app(arguments)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)
     except SystemExit as end:
-        if end.code == INTERRUPTED:  # typer ends like this on Ctrl-C, without a message
-            print("interrupted; no incomplete file was left", file=sys.stderr)
+        if end.code in ENDING:  # typer ends like this on Ctrl-C, without a message
+            print(f"{ENDING[end.code]}; no incomplete file was left", file=sys.stderr)
         raise

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from scenenet.cli.inputs import Failures
 from scenenet.core.errors import InputError
+from scenenet.core.scratch import scratch_folder
 from scenenet.dataset.crops import CropSettings, cut_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.split import SplitSettings, split_crops
@@ -25,6 +26,7 @@ from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.models.model_file import read_model, write_model
 from scenenet.models.predictions import probabilities
 from scenenet.models.settings import ModelSettings, TuningSettings
+from scenenet.pointcloud import survey_in_metres
 from scenenet.pointcloud.ts40k import sample_files
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
@@ -41,20 +43,24 @@ class LabelledFiles:
         parts: part of each crop by its id; empty without a split or with a single crop.
         surveys: table of labelled towers of each survey, TS40K samples excluded.
         survey_crops: ids of the crops that were cut from surveys.
-        skipped: files or samples without a crop, with the reason.
+        read: the files that could be read.
+        skipped: files or samples without a crop, and labelled points that are no tower, with the
+            reason.
     """
 
-    dataset: Dataset
-    parts: dict[str, str]
-    surveys: dict[Path, pd.DataFrame]
-    survey_crops: set[str]
-    skipped: list[dict[str, str]]
+    dataset: Dataset = field(default_factory=lambda: Dataset([], [], "", []))
+    parts: dict[str, str] = field(default_factory=dict)
+    surveys: dict[Path, pd.DataFrame] = field(default_factory=dict)
+    survey_crops: set[str] = field(default_factory=set)
+    read: list[Path] = field(default_factory=list)
+    skipped: list[dict[str, str]] = field(default_factory=list)
 
 
 def read_labelled(
-    paths: Sequence[str | Path],
+    paths: Sequence[Path],
     codes: str,
     grid: VoxelSettings,
+    failures: Failures,
     split: SplitSettings | None = None,
 ) -> LabelledFiles:
     """Cut crops around the labelled towers of files, and voxelise them.
@@ -62,44 +68,68 @@ def read_labelled(
     Args:
         paths: surveys (cut into crops around their towers), and TS40K samples or folders of them.
         codes: class scheme of the labels.
+        failures: gets the errors of the files that cannot be read; the others are read.
         split: the shares of the split; a single crop is not split.
-
-    Raises:
-        InputError: a file cannot be read.
     """
-    surveys: dict[Path, pd.DataFrame] = {}
-    survey_crops: set[str] = set()
-    skipped: list[dict[str, str]] = []
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
-        crop_manifests, voxel_manifests = [], []
-        for number, path in enumerate(map(Path, paths), start=1):
-            folder = Path(scratch) / f"{number}"
-            towers = survey_towers(path, codes, TowerSettings())
+    files = LabelledFiles()
+    seen = failures.look_at(paths, _look)
+    with scratch_folder() as scratch:
+        manifests: list[tuple[Path, Path]] = []
+        for number, path in enumerate(paths, start=1):
+            if path not in seen:
+                continue
             # The number keeps files of the same name in different folders apart.
             name = path.stem if len(paths) == 1 else f"{number}-{path.stem}"
-            crops, voxels = folder / "crops.json", folder / "voxels.json"
-            facts = cut_crops(
-                name, path, codes, towers, CropSettings(), folder / "crops.zarr.zip", crops
-            )
-            skipped += facts["skipped"]
-            if not sample_files(path):
-                surveys[path] = towers
-                survey_crops |= {entry["id"] for entry in facts["crops"]}
-                if len(towers) == 0:
-                    skipped.append({"sample": path.name, "reason": "no labelled tower in it"})
-            build(crops, grid, folder / "voxels.zarr.zip", voxels)
-            crop_manifests.append(crops)
-            voxel_manifests.append(voxels)
-        dataset = load(voxel_manifests)
+            with failures.collect():
+                folder = scratch / f"{number}"
+                manifests.append(_read_file(path, name, codes, grid, folder, files))
+        dataset = load([voxels for _, voxels in manifests])
         parts = {}
         if split is not None and len(dataset.samples) > 1:
-            table = split_crops(crop_manifests, split)
+            table = split_crops([crops for crops, _ in manifests], split)
             parts = dict(zip(table["crop"], table["part"], strict=True))
-    return LabelledFiles(dataset, parts, surveys, survey_crops, skipped)
+    return replace(files, dataset=dataset, parts=parts)
+
+
+def _look(path: Path) -> None:
+    """Look at the header and the unit of a survey, or for the files of samples.
+
+    Raises:
+        InputError: the file cannot be used.
+    """
+    if not sample_files(path):
+        survey_in_metres(path)
+
+
+def _read_file(
+    path: Path, name: str, codes: str, grid: VoxelSettings, folder: Path, files: LabelledFiles
+) -> tuple[Path, Path]:
+    """Add what a file holds to ``files``.
+
+    Returns:
+        the manifests of its crops and of their grids, in ``folder``.
+    """
+    found = survey_towers(path, codes, TowerSettings())
+    files.skipped.extend({"sample": path.name, "reason": note} for note in found.notes())
+    crops, voxels = folder / "crops.json", folder / "voxels.json"
+    facts = cut_crops(
+        name, path, codes, found.towers, CropSettings(), folder / "crops.zarr.zip", crops
+    )
+    build(crops, grid, folder / "voxels.zarr.zip", voxels)
+    files.read.append(path)
+    files.skipped.extend(facts["skipped"])
+    if not sample_files(path):
+        files.surveys[path] = found.towers
+        files.survey_crops.update(entry["id"] for entry in facts["crops"])
+        if len(found.towers) == 0:
+            labelled = int(found.left_out["points"].sum())
+            reason = f"no tower among its {labelled} points labelled tower"
+            files.skipped.append({"sample": path.name, "reason": reason})
+    return crops, voxels
 
 
 def train_files(
-    paths: Sequence[str | Path],
+    paths: Sequence[Path],
     codes: str,
     grid: VoxelSettings,
     settings: ModelSettings,
@@ -108,6 +138,7 @@ def train_files(
     validation: float,
     provenance: dict[str, Any],
     out: str | Path,
+    failures: Failures,
 ) -> dict[str, Any]:
     """Train with several seeds, tune each model on the validation crops, and write the best one.
 
@@ -119,13 +150,15 @@ def train_files(
         the scores of each seed, the chosen seed, the numbers of crops, and the skipped files.
 
     Raises:
-        InputError: a file cannot be read, or none has a labelled tower.
+        InputError: no file has a labelled tower.
+        typer.Exit: no file could be read.
     """
     split = SplitSettings(train=1 - validation, validation=validation, test=0, neighbour=0)
-    files = read_labelled(paths, codes, grid, split if validation > 0 else None)
+    files = read_labelled(paths, codes, grid, failures, split if validation > 0 else None)
     data = files.dataset
-    _require_crops(data, paths)
+    _require_crops(files, paths, failures)
     kept = [s for s in data.samples if files.parts.get(s.id) == "validation"]
+    provenance = provenance | {"files": [path.name for path in files.read]}
     training = [s for s in data.samples if files.parts.get(s.id) != "validation"]
     candidates = []
     for seed in seeds:
@@ -154,11 +187,12 @@ def train_files(
 
 
 def evaluate_files(
-    paths: Sequence[str | Path],
+    paths: Sequence[Path],
     model: str | Path,
     codes: str,
     grid: VoxelSettings | None,
     detection: DetectionSettings,
+    failures: Failures,
 ) -> dict[str, Any]:
     """Scores of a model on labelled files.
 
@@ -171,14 +205,15 @@ def evaluate_files(
         the evaluation as plain values, with ``skipped``.
 
     Raises:
-        InputError: a file cannot be read, or no file has a crop or survey to score.
+        InputError: the model cannot be used, or no file has a crop or survey to score.
+        typer.Exit: no file could be read.
     """
     trained, card = read_model(model)
     whole_surveys = grid is None
     grid = grid or VoxelSettings(fit="metric", voxel_size=card.voxel_size)
-    files = read_labelled(paths, codes, grid)
+    files = read_labelled(paths, codes, grid, failures)
     if not (whole_surveys and files.surveys):
-        _require_crops(files.dataset, paths)
+        _require_crops(files, paths, failures)
     result = score(trained, card, files.dataset, detection)
     if whole_surveys:
         match = TowerMatch(np.empty(0), 0, 0)
@@ -188,7 +223,8 @@ def evaluate_files(
                 found = detect_in_crop(sample, probability, card.threshold(), detection)
                 match += match_crop(found.towers, crop)
         for survey, towers in files.surveys.items():
-            match += _survey_towers(survey, towers, model, detection)
+            with failures.collect():
+                match += _survey_towers(survey, towers, model, detection)
         result = replace(result, towers=TowerScores.of(match))
     return result.to_json() | {"skipped": files.skipped}
 
@@ -202,10 +238,19 @@ def _survey_towers(
     return match_towers(found, towers[["x", "y"]].to_numpy(float))
 
 
-def _require_crops(dataset: Dataset, paths: Sequence[str | Path]) -> None:
-    if not dataset.samples:
-        raise InputError(
-            "no labelled tower in it",
-            file=", ".join(str(path) for path in paths),
-            remedy="Check --codes, and that the points of towers are labelled 15",
-        )
+def _require_crops(files: LabelledFiles, paths: Sequence[Path], failures: Failures) -> None:
+    """End the command if there is no crop.
+
+    Raises:
+        typer.Exit: because files failed.
+        InputError: because no file has a labelled tower.
+    """
+    if files.dataset.samples:
+        return
+    failures.end()
+    reasons = "; ".join(f"{entry['sample']}: {entry['reason']}" for entry in files.skipped)
+    raise InputError(
+        f"no labelled tower in it ({reasons})",
+        file=", ".join(str(path) for path in paths),
+        remedy="Check --codes, and that the points of towers are labelled 15",
+    )

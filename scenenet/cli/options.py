@@ -72,6 +72,13 @@ Resolution = Annotated[
         help=f"Voxels along each edge of a crop: {', '.join(map(str, _RESOLUTIONS))}.",
     ),
 ]
+Overwrite = Annotated[
+    bool,
+    typer.Option(
+        "--overwrite",
+        help="Replace files that exist, whoever wrote them. Inputs are never replaced.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON on stdout.")]
 
 

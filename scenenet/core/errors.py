@@ -1,7 +1,12 @@
-"""The one error that users of the package see: what went wrong, where, and what to do."""
+"""The errors that users of the package see: what went wrong, where, and what to do."""
 
 from __future__ import annotations
 
+import contextlib
+import errno
+import os
+import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 
@@ -34,8 +39,72 @@ class InputError(ValueError):
         super().__init__(where + problem + (f". {remedy}" if remedy else ""))
 
     def __reduce__(self):  # keyword-only arguments do not survive the default pickling
-        return _rebuild, (self.problem, self.file, self.place, self.remedy)
+        return _rebuild, (type(self), self.problem, self.file, self.place, self.remedy)
 
 
-def _rebuild(problem: str, file: str | None, place: str | None, remedy: str | None) -> InputError:
-    return InputError(problem, file=file, place=place, remedy=remedy)
+class OutputError(InputError):
+    """A result cannot be written where it should go; arguments as ``InputError``."""
+
+
+def _rebuild(
+    kind: type[InputError], problem: str, file: str | None, place: str | None, remedy: str | None
+) -> InputError:
+    return kind(problem, file=file, place=place, remedy=remedy)
+
+
+_STORAGE = {
+    errno.ENOSPC: ("the disk is full", "Free space, or choose another disk"),
+    errno.EDQUOT: ("the disk quota is used up", "Free space, or choose another disk"),
+    errno.EFBIG: ("the file would exceed the limit on file sizes", "Raise the limit (ulimit -f)"),
+    errno.EROFS: ("the file system is read-only", "Choose another folder"),
+    errno.EACCES: ("writing is not permitted", "Change the permissions, or choose another folder"),
+    errno.EPERM: ("writing is not permitted", "Change the permissions, or choose another folder"),
+    errno.ENOTDIR: ("a part of its path is a file, not a folder", "Choose another folder"),
+    errno.EEXIST: ("a part of its path is a file, not a folder", "Choose another folder"),
+    errno.EISDIR: ("a folder of this name exists", "Choose another name"),
+    errno.ENAMETOOLONG: ("its name is too long", "Choose a shorter name"),
+    errno.ENOENT: ("its folder was removed", "Run it again"),
+    errno.EIO: ("the disk reports an input or output error", "Check the disk"),
+}
+
+
+def output_error(path: str | Path, reason: OSError, what: str = "the file") -> OutputError | None:
+    """The message for an error of the storage under ``path``; None for other errors."""
+    if reason.errno not in _STORAGE:
+        return None
+    problem, remedy = _STORAGE[reason.errno]
+    if reason.errno in (errno.ENOSPC, errno.EDQUOT):
+        problem += f" ({free_space(path) / 1e6:,.1f} MB are free)"
+    return OutputError(f"{what} cannot be written: {problem}", file=path, remedy=remedy)
+
+
+@contextlib.contextmanager
+def storage_errors(path: Path, scratch: str, what: str = "the file") -> Iterator[None]:
+    """Turn errors of the storage under ``path`` that the block raises into an OutputError.
+
+    Errors about other paths pass unchanged.
+
+    Args:
+        path: the result, or the folder of temporary files.
+        scratch: how the absolute paths of the block's temporary files begin.
+        what: the subject of the message.
+    """
+    try:
+        yield
+    except OSError as error:
+        if error.filename is not None:
+            about = str(Path(os.fsdecode(error.filename)).absolute())
+            above = {str(folder) for folder in (path.absolute(), *path.absolute().parents)}
+            if about not in above and not about.startswith(scratch):
+                raise
+        message = output_error(path, error, what)
+        if message is None:
+            raise
+        raise message from error
+
+
+def free_space(path: str | Path) -> int:
+    """Free bytes on the disk of ``path``, which need not exist yet."""
+    path = Path(path).absolute()
+    existing = next(folder for folder in (path, *path.parents) if folder.exists())
+    return shutil.disk_usage(existing).free

@@ -6,31 +6,35 @@ import contextlib
 import hashlib
 import json
 import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from scenenet.core.errors import storage_errors
+from scenenet.core.scratch import scratch_beside, scratch_prefix
 
 
 @contextlib.contextmanager
 def atomic(path: str | Path) -> Iterator[Path]:
     """A temporary path that is renamed to ``path`` when the block ends without an error.
 
-    A reader never sees half a file, and Ctrl-C leaves neither the file nor the temporary one. The
-    temporary path is in the same folder and keeps the suffix, because libraries choose a format by
-    it. Works for files and for directories (an existing directory is replaced).
+    A reader never sees half a file, and Ctrl-C leaves neither the file nor the temporary one. What
+    a killed process leaves is removed when ``path`` is written next. The temporary path is in the
+    same folder and keeps the suffix, because libraries choose a format by it. Works for files and
+    for directories (an existing directory is replaced).
+
+    Raises:
+        OutputError: the disk is full, the folder cannot be written to, or similar.
     """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    scratch = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    partial = scratch / path.name
-    try:
-        yield partial
-        if partial.is_dir() and path.is_dir():
-            shutil.rmtree(path)
-        partial.replace(path)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+    with storage_errors(path, scratch_prefix(path)):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with scratch_beside(path) as scratch:
+            partial = scratch / path.name
+            yield partial
+            if partial.is_dir() and path.is_dir():
+                shutil.rmtree(path)
+            partial.replace(path)
 
 
 def write_text(path: str | Path, text: str) -> None:

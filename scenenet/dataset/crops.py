@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import pandas as pd
 from pydantic import Field
 
 from scenenet.core.progress import track
+from scenenet.core.scratch import scratch_folder
 from scenenet.core.settings import Settings
 from scenenet.dataset.zarr_store import StoreReader, create
 from scenenet.pointcloud import iter_chunks, read
@@ -123,8 +123,8 @@ def _cut(
     centres = towers[["x", "y"]].to_numpy(float)
     radii = towers["height"].to_numpy(float) * settings.radius_in_heights
     scheme = class_scheme(codes)
-    with tempfile.TemporaryDirectory() as folder:
-        spools = [Path(folder) / f"{number}" for number in towers["tower"]]
+    with scratch_folder() as folder:
+        spools = [folder / f"{number}" for number in towers["tower"]]
         for spool in spools:
             spool.touch()
         for chunk in track(iter_chunks(path, codes), f"{survey}: chunks read"):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,15 +19,30 @@ COLUMNS = ("tower", "x", "y", "base", "top", "height", "width", "length", "point
 minus base. width, length: sides of the base, m, width <= length. points: labelled points. spacing:
 m to the next tower along the line, NaN for the last."""
 
+LEFT_OUT_COLUMNS = ("x", "y", "points", "height", "reason")
+"""x, y: centre of the points, m. points: their number. height: top minus base, m. reason: why these
+points labelled tower are no tower."""
+
 
 class TowerSettings(Settings):
-    """DBSCAN of the points labelled tower."""
+    """DBSCAN of the points labelled tower.
+
+    ``min_points`` is that of the thesis, for surveys with hundreds of points on a tower. A thinner
+    survey, a pole, or a tower at the edge of a strip has fewer: what is left is clustered again
+    with ``sparse_points``.
+    """
 
     eps: float = Field(
         10.0, gt=0, description="largest distance between neighbouring points of a tower, m"
     )
     min_points: int = Field(
         300, ge=1, description="points that a core point of a tower must have within eps"
+    )
+    sparse_points: int = Field(
+        10, ge=1, description="as min_points, for towers with too few points for it"
+    )
+    sparse_height: float = Field(
+        4.0, ge=0, description="height that a tower found with sparse_points must have, m"
     )
     cell: float = Field(
         1.0,
@@ -34,48 +51,139 @@ class TowerSettings(Settings):
     )
 
 
-def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> pd.DataFrame:
+@dataclass(frozen=True)
+class LabelledTowers:
+    """The towers in the labels of a survey.
+
+    Attributes:
+        towers: a row per tower with ``COLUMNS``, in order along the line. TS40K samples add
+            ``sample``, the name of the sample, and have spacing NaN, because they are single crops.
+        left_out: a row per group of points labelled tower that is no tower, with
+            ``LEFT_OUT_COLUMNS``, and ``sample`` as above.
+    """
+
+    towers: pd.DataFrame
+    left_out: pd.DataFrame
+
+    def notes(self) -> list[str]:
+        """A sentence for each row of ``left_out``."""
+        return [
+            f"{row.points} points labelled tower about x {row.x:.1f}, y {row.y:.1f} are left out: "
+            f"{row.reason}"
+            for row in self.left_out.itertuples()
+        ]
+
+
+def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> LabelledTowers:
     """Towers of a labelled survey, of one TS40K sample, or of a folder of TS40K samples.
 
     Only points labelled tower are kept in memory.
-
-    Returns:
-        a row per tower with ``COLUMNS``; TS40K samples add ``sample``, the name of the sample, and
-        have spacing NaN, because they are single crops.
     """
     samples = sample_files(path)
     if not samples:
         survey_in_metres(path)
         return find_towers(_tower_points(path, codes), settings)
-    tables = []
+    tables, left_out = [], []
     for sample in samples:
         found = find_towers(_tower_points(sample, codes), settings)
-        tables.append(found.assign(sample=sample.stem, spacing=np.nan))
+        tables.append(found.towers.assign(sample=sample.stem, spacing=np.nan))
+        left_out.append(found.left_out.assign(sample=sample.stem))
     table = pd.concat(tables, ignore_index=True)
     table["tower"] = np.arange(1, len(table) + 1)
-    return table
+    return LabelledTowers(table, pd.concat(left_out, ignore_index=True))
 
 
-def find_towers(xyz: np.ndarray, settings: TowerSettings) -> pd.DataFrame:
-    """Group tower points (N, 3), xyz in m, into instances and measure each.
-
-    Returns:
-        a row per tower with ``COLUMNS``, in order along the line.
-    """
-    labels = cluster(xyz, settings)
-    rows = [_measure(xyz[labels == label]) for label in range(labels.max(initial=-1) + 1)]
+def find_towers(xyz: np.ndarray, settings: TowerSettings) -> LabelledTowers:
+    """Group tower points (N, 3), xyz in m, into instances and measure each."""
+    groups = cluster(xyz, settings)
+    left_out = pd.DataFrame(_left_out(xyz, groups, settings), columns=list(LEFT_OUT_COLUMNS))
+    rows = [_measure(xyz[groups.tower == n]) for n in range(groups.tower.max(initial=-1) + 1)]
     if not rows:
-        return pd.DataFrame(columns=list(COLUMNS))
+        return LabelledTowers(pd.DataFrame(columns=list(COLUMNS)), left_out)
     table = pd.DataFrame(rows)
     order = line_order(table[["x", "y"]].to_numpy())
     table = table.iloc[order].reset_index(drop=True)
     step = np.diff(table[["x", "y"]].to_numpy(), axis=0)
     table["spacing"] = np.append(np.hypot(step[:, 0], step[:, 1]), np.nan)
     table.insert(0, "tower", np.arange(1, len(table) + 1))
-    return table[list(COLUMNS)]
+    return LabelledTowers(table[list(COLUMNS)], left_out)
 
 
-def cluster(xyz: np.ndarray, settings: TowerSettings) -> np.ndarray:
+@dataclass(frozen=True)
+class Groups:
+    """Points labelled tower in groups.
+
+    Attributes:
+        tower: (N,) int, the tower of each point from 0; -1 for none.
+        left_out: (N,) int, the group of each point that is no tower from 0; -1 for points of a
+            tower, and for scattered points.
+    """
+
+    tower: np.ndarray
+    left_out: np.ndarray
+
+
+def cluster(xyz: np.ndarray, settings: TowerSettings) -> Groups:
+    """The tower of each point (N, 3), xyz in m, by DBSCAN.
+
+    A second DBSCAN, with ``sparse_points``, groups the points that the first leaves. Such a group
+    is a tower if it is ``sparse_height`` high and lies further from every tower than twice ``eps``:
+    nearer, it is a part of that tower, or of something beside it that was labelled wrongly.
+    """
+    tower = _dbscan(xyz, settings.min_points, settings)
+    left_out = np.full(len(xyz), -1)
+    rest = np.flatnonzero(tower < 0)
+    sparse = _dbscan(xyz[rest], settings.sparse_points, settings)
+    dense = xyz[tower >= 0]
+    next_tower, next_left_out = tower.max(initial=-1) + 1, 0
+    for label in range(sparse.max(initial=-1) + 1):
+        rows = rest[sparse == label]
+        if _why_no_tower(xyz[rows], dense, settings) is None:
+            tower[rows], next_tower = next_tower, next_tower + 1
+        else:
+            left_out[rows], next_left_out = next_left_out, next_left_out + 1
+    return Groups(tower, left_out)
+
+
+def _why_no_tower(xyz: np.ndarray, dense: np.ndarray, settings: TowerSettings) -> str | None:
+    """Why a group (n, 3) of few points is no tower; None if it is one.
+
+    Args:
+        dense: (N, 3) points of the towers with ``min_points``.
+    """
+    height = np.ptp(xyz[:, 2])
+    if height < settings.sparse_height:
+        return f"they are {height:.1f} m high, less than {settings.sparse_height:g} m"
+    nearest = np.hypot(*(dense[:, :2] - np.median(xyz[:, :2], axis=0)).T).min(initial=np.inf)
+    if nearest <= 2 * settings.eps:
+        return f"they lie {nearest:.1f} m beside a tower with more points"
+    return None
+
+
+def _left_out(xyz: np.ndarray, groups: Groups, settings: TowerSettings) -> list[dict[str, Any]]:
+    """The rows of ``LabelledTowers.left_out``."""
+    dense = xyz[groups.tower >= 0]
+    reasons = {}
+    for label in range(groups.left_out.max(initial=-1) + 1):
+        part = xyz[groups.left_out == label]
+        reasons[label] = part, _why_no_tower(part, dense, settings)
+    scattered = xyz[(groups.tower < 0) & (groups.left_out < 0)]
+    if len(scattered):
+        fewest = settings.sparse_points
+        reasons[-1] = scattered, f"fewer than {fewest} of them lie within {settings.eps:g} m"
+    return [
+        {
+            "x": np.median(part[:, 0]),
+            "y": np.median(part[:, 1]),
+            "points": len(part),
+            "height": np.ptp(part[:, 2]),
+            "reason": reason,
+        }
+        for part, reason in reasons.values()
+    ]
+
+
+def _dbscan(xyz: np.ndarray, min_points: int, settings: TowerSettings) -> np.ndarray:
     """DBSCAN instance of each point (N, 3): (N,) int from 0, -1 for noise.
 
     The memory of DBSCAN grows with the square of the points of a tower, so it gets one weighted
@@ -91,7 +199,7 @@ def cluster(xyz: np.ndarray, settings: TowerSettings) -> np.ndarray:
     cell_of = cell_of.reshape(-1)  # numpy 2.0 gives (N, 1), later ones (N,)
     sums = np.stack([np.bincount(cell_of, weights=axis) for axis in local.T], axis=1)
     centre = sums / count[:, None]
-    dbscan = DBSCAN(eps=settings.eps, min_samples=settings.min_points)
+    dbscan = DBSCAN(eps=settings.eps, min_samples=min_points)
     return dbscan.fit_predict(centre, sample_weight=count)[cell_of]
 
 

@@ -35,7 +35,7 @@ def draw_clusters(
     settings = TowerSettings.model_validate(_tower_settings(results, survey))
     parts = [chunk.xyz[chunk.is_tower] for chunk in iter_chunks(path, codes)]
     xyz = np.concatenate([*parts, np.empty((0, 3))])
-    labels = cluster(xyz, settings)
+    labels = cluster(xyz, settings).tower
     keep = thinned(len(xyz))
     alt = clusters(xyz[keep, :2], labels[keep], out)
     return alt, (

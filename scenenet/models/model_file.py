@@ -117,6 +117,15 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
         ) from None
 
 
+def is_model_file(path: str | Path) -> bool:
+    """Whether the file is a model that this version can read."""
+    try:
+        read_model(path)
+    except InputError:
+        return False
+    return True
+
+
 def _numbers(model: GeneoModel) -> dict[str, Any]:
     """The parameters of a SCENE-Net in a readable form."""
     values = model.shape_parameters()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.core.progress import track
+from scenenet.core.scratch import scratch_folder
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.pointcloud import iter_chunks, survey_in_metres
@@ -99,14 +99,14 @@ def predict_survey(
     geneos = trained.names if isinstance(trained, GeneoModel) else []
     voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
     name, crs = Path(survey).name, survey_in_metres(survey).crs
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
-        spool = TileSpool(Path(scratch), voxel_size)
+    with scratch_folder() as scratch:
+        spool = TileSpool(scratch, voxel_size)
         n_points = 0
         chunks = iter_chunks(survey, chunk_points=settings.chunk_points)
         for chunk in track(chunks, f"{name}: chunks read"):
             spool.add(chunk.xyz)
             n_points += len(chunk)
-        tiles = TilePredictions(spool, Path(scratch), geneos)
+        tiles = TilePredictions(spool, scratch, geneos)
         tiles.compute(trained, card, f"{name}: tiles predicted")
         towers = tuple(tiles.find_towers(tau, detection))
         yield SurveyPrediction(

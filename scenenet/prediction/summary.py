@@ -27,6 +27,8 @@ class PredictionSummary:
         seconds: time of the prediction, files included, s.
         settings: settings of the prediction, with those of ``detection``.
         model_provenance: provenance of the model.
+        outputs: name -> fingerprint of the classified points and of the tower list. A later
+            prediction replaces these files only if they are unchanged.
     """
 
     survey: str
@@ -41,6 +43,7 @@ class PredictionSummary:
     seconds: float
     settings: dict[str, Any]
     model_provenance: dict[str, Any]
+    outputs: dict[str, str]
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)

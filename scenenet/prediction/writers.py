@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scenenet.core.errors import InputError
-from scenenet.core.files import write_json
+from scenenet.core.files import atomic, read_json, write_json
+from scenenet.core.outputs import Output
+from scenenet.core.provenance import fingerprint
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.pointcloud import add_dimensions
@@ -26,12 +29,58 @@ TOWER_ID = "tower_id"
 SHARE_PREFIX = "share_"
 
 
+RESULT_BYTES, SCRATCH_BYTES = 12, 8
+"""Bytes that a point takes in the result, beyond those in the survey, and in temporary files. Most
+measured on airborne and mobile surveys: 11.4 and 3.1."""
+
+
+@dataclass(frozen=True)
+class PredictionFiles:
+    """The files of a prediction.
+
+    Attributes:
+        points: the survey with the dimensions of ``point_dimensions`` (LAZ).
+        towers: the tower list (GeoJSON).
+        summary: ``PredictionSummary`` (JSON).
+    """
+
+    points: Path
+    towers: Path
+    summary: Path
+
+    @classmethod
+    def of(cls, survey: Path, folder: Path) -> PredictionFiles:
+        """The files that the command line writes for a survey; ``.copc`` is not part of a name."""
+        points = folder / f"{survey.stem.removesuffix('.copc')}.laz"
+        return cls(
+            points, points.with_suffix(".towers.geojson"), points.with_suffix(".summary.json")
+        )
+
+    def outputs(self, survey: Path) -> list[Output]:
+        return [
+            Output(path, self.is_own, survey) for path in (self.points, self.towers, self.summary)
+        ]
+
+    def is_own(self, path: Path) -> bool:
+        """Whether ``path`` is as an earlier prediction wrote it; its summary is the record."""
+        try:
+            written = read_json(self.summary)["outputs"]
+            if path == self.summary:
+                return isinstance(written, dict)
+            return bool(fingerprint(path) == written[path.name])
+        except (InputError, KeyError, OSError, TypeError, ValueError):
+            return False
+
+
+def space_needed(survey: Path, n_points: int) -> tuple[int, int]:
+    """About how many bytes the results of a survey take, and the temporary files meanwhile."""
+    return survey.stat().st_size + RESULT_BYTES * n_points, SCRATCH_BYTES * n_points
+
+
 def predict_to_files(
     survey: str | Path,
     model: str | Path,
-    out_laz: str | Path,
-    out_geojson: str | Path,
-    out_summary: str | Path,
+    files: PredictionFiles,
     settings: PredictSettings,
     detection: DetectionSettings,
 ) -> PredictionSummary:
@@ -42,18 +91,26 @@ def predict_to_files(
     Args:
         survey: LAS, LAZ, COPC or TS40K sample.
         model: model file with tau.
-        out_laz: see ``write_points``.
-        out_geojson: see ``tower_collection``.
-        out_summary: ``PredictionSummary`` as JSON.
+        files: to write; all of them appear, or none.
 
     Raises:
         InputError: the survey or the model cannot be used.
+        OutputError: a file cannot be written.
     """
-    with predict_survey(survey, model, settings, detection) as prediction:
-        write_points(prediction, out_laz)
-        write_json(out_geojson, tower_collection(prediction.towers, prediction.crs))
-        summary = summarise(prediction)
-    write_json(out_summary, summary.to_json())
+    with (
+        predict_survey(survey, model, settings, detection) as prediction,
+        atomic(files.points) as points,
+        atomic(files.towers) as towers,
+        atomic(files.summary) as record,
+    ):
+        write_points(prediction, points)
+        write_json(towers, tower_collection(prediction.towers, prediction.crs))
+        outputs = {
+            files.points.name: fingerprint(points),
+            files.towers.name: fingerprint(towers),
+        }
+        summary = summarise(prediction, outputs)
+        write_json(record, summary.to_json())
     return summary
 
 
@@ -102,8 +159,8 @@ def tower_collection(towers: Iterable[SurveyTower], crs: pyproj.CRS | None) -> d
     return collection
 
 
-def summarise(prediction: SurveyPrediction) -> PredictionSummary:
-    """The summary of a prediction; ``seconds`` counts up to this call."""
+def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> PredictionSummary:
+    """The summary of a prediction with the files ``outputs``; ``seconds`` counts up to now."""
     detection = {"detection": prediction.detection.model_dump()}
     crs = prediction.crs
     return PredictionSummary(
@@ -119,4 +176,5 @@ def summarise(prediction: SurveyPrediction) -> PredictionSummary:
         seconds=time.perf_counter() - prediction.started,
         settings=prediction.settings.model_dump() | detection,
         model_provenance=prediction.card.provenance,
+        outputs=outputs,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pandas as pd
 
 from scenenet.core.files import write_text
 from scenenet.core.progress import track
+from scenenet.core.scratch import scratch_folder
 from scenenet.detection.settings import DetectionSettings
 from scenenet.figures import Picture
 from scenenet.figures.plots.point_clouds import View, side_views
@@ -22,6 +22,18 @@ from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section,
 from scenenet.report.page import render
 
 POINTS_PER_PICTURE = 20_000
+
+GENERATOR = "scenenet explain"
+"""Mark of the page in its head."""
+
+
+def is_explanation(path: Path) -> bool:
+    """Whether the file is a page that ``explain_survey`` wrote."""
+    try:
+        with path.open("rb") as stream:
+            return f'name="generator" content="{GENERATOR}"'.encode() in stream.read(1000)
+    except OSError:
+        return False
 
 
 def explain_survey(
@@ -54,12 +66,12 @@ def explain_survey(
     ]
     blocks = [Facts(facts), *_parameters(meanings(prediction.model, card))]
     sections = [Section("survey", Path(survey).name, blocks)]
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
+    with scratch_folder() as scratch:
         for explanation, (xyz, views) in zip(explained, surroundings, strict=True):
-            picture = Path(scratch) / f"{explanation.id}.png"
+            picture = scratch / f"{explanation.id}.png"
             sections.append(_section(explanation, xyz, views, picture))
         title = f"Why these are towers: {Path(survey).name}"
-        write_text(out, render(sections, title, f"model {card.name}, {card.provenance}"))
+        write_text(out, render(sections, title, f"model {card.name}, {card.provenance}", GENERATOR))
     return explained
 
 

@@ -68,12 +68,12 @@ def write_report(
     """
     context = ReportContext(results, thesis)
     made = [section for make in SECTIONS if (section := make(context)) is not None]
-    write_text(out, render(made, title, thesis.source))
+    write_text(out, render(made, title, thesis.source, "scenenet report"))
     return made
 
 
-def render(made: Sequence[Section], title: str, source: str) -> str:
-    """Sections as an HTML page."""
+def render(made: Sequence[Section], title: str, source: str, generator: str) -> str:
+    """Sections as an HTML page; ``generator`` says in its head what wrote it."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -88,7 +88,9 @@ def render(made: Sequence[Section], title: str, source: str) -> str:
     style = Markup((ASSETS / "style.css").read_text(encoding="utf-8"))
     script = Markup((ASSETS / "page.js").read_text(encoding="utf-8"))
     page = environment.get_template("page.html")
-    return page.render(title=title, sections=made, style=style, script=script, source=source)
+    return page.render(
+        title=title, sections=made, style=style, script=script, source=source, generator=generator
+    )
 
 
 def data_uri(path: Path) -> str:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from scenenet.synthetic.corridor import Corridor, Stretch, TrueTower, corridor_cloud, make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
-from scenenet.synthetic.survey import make_survey, towers_geojson
+from scenenet.synthetic.survey import is_synthetic_survey, make_survey, towers_geojson
 
 __all__ = [
     "Corridor",
@@ -21,6 +21,7 @@ __all__ = [
     "SyntheticSettings",
     "TrueTower",
     "corridor_cloud",
+    "is_synthetic_survey",
     "make_corridor",
     "make_survey",
     "towers_geojson",

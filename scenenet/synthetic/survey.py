@@ -16,6 +16,9 @@ from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.corridor import TrueTower, make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
 
+GENERATOR = "scenenet synth"
+"""The generating software in the header of a synthetic survey."""
+
 
 def make_survey(
     settings: SyntheticSettings,
@@ -51,10 +54,10 @@ def make_survey(
     # The line starts at the origin; a file with steps of 1 mm reaches 2000 km to each side of it.
     offsets = np.floor([settings.easting / 1000, settings.northing / 1000, 0.0]) * 1000
     with contextlib.ExitStack() as files:
-        annotated = files.enter_context(las_stream(out, corridor.crs, offsets))
+        annotated = files.enter_context(las_stream(out, corridor.crs, offsets, software=GENERATOR))
         true = None
         if truth is not None:
-            true = files.enter_context(las_stream(truth, corridor.crs, offsets))
+            true = files.enter_context(las_stream(truth, corridor.crs, offsets, software=GENERATOR))
         for stretch in stretches:
             annotated(stretch.xyz, stretch.labels)
             if true is not None:
@@ -71,6 +74,19 @@ def make_survey(
         "classes": {int(code): int(counts[code]) for code in np.flatnonzero(counts)},
         "mislabelled": round(wrong / max(int(counts[TOWER]), 1), 4),
     }
+
+
+def is_synthetic_survey(path: Path) -> bool:
+    """Whether the file is a survey that ``make_survey`` wrote, and not a prediction for one."""
+    import laspy
+
+    try:
+        with laspy.open(path) as reader:
+            header = reader.header
+            dimensions = list(header.point_format.extra_dimension_names)
+    except Exception:  # any fault of any file: it is not one of ours
+        return False
+    return header.generating_software.strip() == GENERATOR and not dimensions
 
 
 def towers_geojson(towers: list[TrueTower], epsg: int) -> dict[str, Any]:

@@ -6,13 +6,14 @@ to them.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from scenenet.core.scratch import scratch_folder
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -66,9 +67,9 @@ def log_model(
         params={name: str(value) for name, value in params.items()},
         model_type="pyfunc",
     )
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
-        _save(Path(scratch) / "model", record.file, run_id, logged.model_id)
-        client.log_model_artifacts(logged.model_id, str(Path(scratch) / "model"))
+    with scratch_folder() as scratch:
+        _save(scratch / "model", record.file, run_id, logged.model_id)
+        client.log_model_artifacts(logged.model_id, str(scratch / "model"))
     client.finalize_logged_model(logged.model_id, "READY")
     client.log_outputs(run_id, [LoggedModelOutput(logged.model_id, 0)])
     return logged.model_id

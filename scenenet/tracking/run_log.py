@@ -8,7 +8,6 @@ differs, the new run is logged and the old one is deleted with its logged models
 from __future__ import annotations
 
 import json
-import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -17,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenenet.core import files
 from scenenet.core.errors import InputError
+from scenenet.core.scratch import scratch_folder
 from scenenet.tracking.logged_model import ModelRecord, log_model, model_ids
 from scenenet.tracking.store import (
     TrackingSettings,
@@ -289,9 +289,9 @@ def _log_artifacts(client: MlflowClient, run_id: str, record: RunRecord) -> None
         client.log_artifact(run_id, str(path), None if folder == "." else folder)
     if not record.drawings:
         return
-    with tempfile.TemporaryDirectory() as scratch:
+    with scratch_folder() as scratch:
         for to, draw in record.drawings.items():
-            path = Path(scratch) / to
+            path = scratch / to
             path.parent.mkdir(parents=True, exist_ok=True)
             draw(path)
-        client.log_artifacts(run_id, scratch)
+        client.log_artifacts(run_id, str(scratch))

@@ -217,7 +217,8 @@ def test_the_command_line_knows_every_class_scheme():
     assert {codes.value for codes in Codes} == set(SCHEMES)
 
 
-def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path, number):
     out = tmp_path / "out"
     call = [sys.executable, "-c", "from scenenet.cli.app import main; main()", "predict", survey]
     process = subprocess.Popen(
@@ -226,12 +227,16 @@ def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path
         text=True,
         env=os.environ | {"TMPDIR": str(tmp_path)},
         # Under some runners Ctrl-C is ignored, and children inherit that.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=lambda: [
+            signal.signal(signal.SIGINT, signal.default_int_handler),
+            signal.signal(signal.SIGHUP, signal.SIG_DFL),
+        ],
     )
     assert process.stderr is not None
     said = process.stderr.readline()  # the survey has been read, the tiles come next
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     said += process.communicate(timeout=60)[1]
-    assert process.returncode == 130
-    assert "interrupted" in said and "Traceback" not in said
-    assert [f.name for f in tmp_path.rglob("*") if f.is_file()] == []
+    assert process.returncode == 128 + number
+    assert "no incomplete file was left" in said and "Traceback" not in said
+    assert list(tmp_path.iterdir()) in ([], [out])
+    assert not out.exists() or list(out.iterdir()) == []

@@ -86,7 +86,7 @@ def test_a_crop_lists_all_towers_in_it(field, tmp_path):
 
 
 def test_a_survey_without_towers_gives_an_empty_store(field, tmp_path):
-    towers = survey_towers(field[0], "edp", TowerSettings(min_points=100_000))
+    towers = survey_towers(field[0], "edp", TowerSettings(min_points=100_000)).towers
     facts, crops = cut(field[0], towers, tmp_path)
     assert facts["crops"] == crops == []
 
@@ -97,7 +97,7 @@ def test_samples_are_copied_unchanged(tmp_path, scene):
     clouds = {"sample_1": scene(seed=1), "sample_2": scene(seed=2), "sample_3": scene(poles=())}
     for name, cloud in clouds.items():
         np.save(folder / f"{name}.npy", np.column_stack([cloud.xyz, cloud.classification]))
-    towers = survey_towers(folder, "edp", TowerSettings(min_points=100))
+    towers = survey_towers(folder, "edp", TowerSettings(min_points=100)).towers
     facts, crops = cut(folder, towers, tmp_path)
     assert [crop.id for crop, _ in crops] == ["field-sample_1", "field-sample_2"]
     np.testing.assert_array_equal(crops[0][1].xyz, clouds["sample_1"].xyz)

@@ -133,7 +133,7 @@ def test_the_cache_gives_back_what_was_voxelised(tmp_path, scene):
     for number, made in enumerate(clouds):
         path = samples / f"sample_{number}.npy"
         np.save(path, np.column_stack([made.xyz, made.classification]))
-    towers = survey_towers(samples, "edp", TowerSettings(min_points=100))
+    towers = survey_towers(samples, "edp", TowerSettings(min_points=100)).towers
     crops, voxels = tmp_path / "crops.json", tmp_path / "voxels.json"
     cut_crops("s", samples, "edp", towers, CropSettings(), tmp_path / "c.zarr.zip", crops)
     settings = VoxelSettings(fit="metric", voxel_size=1.0)

@@ -15,7 +15,7 @@ def test_a_row_for_every_crop_and_grid(tmp_path):
     line = tmp_path / "line.laz"
     make_survey(SyntheticSettings(towers=2, seed=5, density=8, tower_density=16), line)
     manifest = tmp_path / "crops.json"
-    towers = survey_towers(line, "edp", TowerSettings())
+    towers = survey_towers(line, "edp", TowerSettings()).towers
     cut_crops("line", line, "edp", towers, CropSettings(), tmp_path / "crops.zarr.zip", manifest)
     table = time_grids([manifest], tmp_path / "grids.csv")
     assert tuple(pd.read_csv(tmp_path / "grids.csv").columns) == COLUMNS

@@ -21,7 +21,7 @@ from scenenet.models.model_file import ModelCard, read_model, write_model
 from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
 from scenenet.pointcloud import PointCloud, read, write_las
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.writers import predict_to_files
+from scenenet.prediction.writers import PredictionFiles, predict_to_files
 from scenenet.training.train import fit
 from scenenet.training.tuning import choose
 
@@ -62,7 +62,11 @@ def predict(
     folder.mkdir(exist_ok=True)
     laz, geojson, summary = (folder / n for n in ("out.laz", "towers.geojson", "summary.json"))
     returned = predict_to_files(
-        survey, model, laz, geojson, summary, PredictSettings(**settings), detection
+        survey,
+        model,
+        PredictionFiles(laz, geojson, summary),
+        PredictSettings(**settings),
+        detection,
     ).to_json()
     assert json.loads(summary.read_text()) == returned
     return Prediction(laz, json.loads(geojson.read_text()), returned)

@@ -146,7 +146,7 @@ def test_dbscan_of_the_thesis_finds_every_tower(default):
     from scenenet.dataset.labelled_towers import TowerSettings, find_towers
 
     _, cloud, _, towers = default
-    found = find_towers(cloud.xyz[cloud.is_tower], TowerSettings())
+    found = find_towers(cloud.xyz[cloud.is_tower], TowerSettings()).towers
     assert len(found) == len(towers)
     for row in found.itertuples():
         away = [np.hypot(row.x - t.x, row.y - t.y) for t in towers]

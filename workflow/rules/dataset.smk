@@ -6,6 +6,7 @@ rule towers:
         survey=lambda w: source(w.survey),
     output:
         towers=f"{R}/towers/{{survey}}/towers.csv",
+        left_out=f"{R}/towers/{{survey}}/left_out.csv",
         provenance=f"{R}/towers/{{survey}}/provenance.json",
     log:
         f"{R}/logs/towers/{{survey}}.log",

@@ -95,7 +95,9 @@ def run(stage: Callable[[Job], object]) -> None:
     on the terminal as well.
     """
     import __main__
+    from scenenet.core.interrupts import end_cleanly_on_signals
 
+    end_cleanly_on_signals()
     snakemake = __main__.snakemake
     log = _redirect(snakemake.log[0])
     sys.excepthook = lambda kind, error, trace: _explain(log, kind, error, trace)

@@ -4,12 +4,20 @@ import _job
 
 
 def towers(job: _job.Job) -> None:
+    import sys
+
     from scenenet.core.files import atomic
     from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 
-    table = survey_towers(job.input.survey, job.identity["codes"], TowerSettings(**job.settings))
-    with atomic(job.output.towers) as partial:
-        table.to_csv(partial, index=False)
+    found = survey_towers(job.input.survey, job.identity["codes"], TowerSettings(**job.settings))
+    for note in found.notes():
+        print(f"{job.input.survey}: {note}", file=sys.stderr)
+    for table, path in (
+        (found.left_out, job.output.left_out),
+        (found.towers, job.output.towers),
+    ):
+        with atomic(path) as partial:
+            table.to_csv(partial, index=False)
 
 
 _job.run(towers)

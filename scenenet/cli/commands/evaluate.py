@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
     Fits,
@@ -48,12 +49,16 @@ def command(
     The voxel scores are precision, recall, F0.5 and IoU at the threshold tau of the model.
 
     A predicted tower within 5 m of a labelled one is a true positive.
+
+    The exit code is 1 if a file fails; the other files are still scored.
     """
     from scenenet.cli.labelled_files import evaluate_files
 
     grid = cube(resolution) if fit.value == "cube" else None
     detection = detection_settings(min_conductor)
-    result = evaluate_files(labelled, model, codes.value, grid, detection)
+    failures = Failures()
+    result = evaluate_files(labelled, model, codes.value, grid, detection, failures)
     for skipped in result["skipped"]:
         print(f"not scored: {skipped['sample']}: {skipped['reason']}", file=sys.stderr)
     show(result, as_json, score_lines)
+    failures.end()

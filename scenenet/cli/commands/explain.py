@@ -8,7 +8,14 @@ from typing import Annotated
 
 import typer
 
-from scenenet.cli.options import AsJson, MinConductor, ModelFile, Survey, detection_settings
+from scenenet.cli.options import (
+    AsJson,
+    MinConductor,
+    ModelFile,
+    Overwrite,
+    Survey,
+    detection_settings,
+)
 from scenenet.cli.output import show
 
 EXAMPLES = ("scenenet explain line.laz --model model.json --out towers.html",)
@@ -19,6 +26,7 @@ def command(
     model: ModelFile,
     out: Annotated[Path, typer.Option("--out", help="Page to write (.html).")],
     min_conductor: MinConductor = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Write a page that explains every tower of a survey.
@@ -26,13 +34,19 @@ def command(
     Each tower has its measurements, the share of each GENEO, reasons to check it, and a picture.
 
     The page needs no other file and no network.
+
+    A file that exists is replaced only if it is an explanation.
     """
     from scenenet.core.extras import require
     from scenenet.prediction.settings import PredictSettings
 
     require("report", "scenenet explain")  # before the prediction, which takes minutes
-    from scenenet.report.explanation_page import explain_survey
+    from scenenet.core.outputs import Output, check_outputs
+    from scenenet.report.explanation_page import explain_survey, is_explanation
 
+    if out.suffix.lower() not in (".html", ".htm"):
+        raise typer.BadParameter("an explanation is an .html file", param_hint="--out")
+    check_outputs([Output(out, is_explanation)], [survey, model], overwrite=overwrite)
     detection = detection_settings(min_conductor)
     found = explain_survey(survey, model, out, PredictSettings(), detection)
     show(

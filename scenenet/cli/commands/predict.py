@@ -7,9 +7,16 @@ from typing import Annotated
 
 import typer
 
-from scenenet.cli.options import AsJson, MinConductor, ModelFile, Surveys, detection_settings
+from scenenet.cli.inputs import Failures
+from scenenet.cli.options import (
+    AsJson,
+    MinConductor,
+    ModelFile,
+    Overwrite,
+    Surveys,
+    detection_settings,
+)
 from scenenet.cli.output import show
-from scenenet.core.errors import InputError
 
 EXAMPLES = (
     "scenenet predict line.laz --model model.json --out predicted",
@@ -28,6 +35,7 @@ def command(
         ),
     ] = None,
     min_conductor: MinConductor = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the towers of surveys and classify every point.
@@ -40,34 +48,35 @@ def command(
     NAME.towers.geojson: the towers, with position, height, base elevation (m) and probability.
 
     NAME.summary.json: counts, settings and time.
-    """
-    from scenenet.prediction.settings import PredictSettings
-    from scenenet.prediction.writers import predict_to_files
 
-    names = [survey.stem for survey in surveys]
-    if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise InputError(
-            f"two surveys are called {', '.join(twice)} and would overwrite each other",
-            remedy="Predict them one by one into different folders",
-        )
+    A file that exists is replaced only if an earlier prediction wrote it and nothing changed it.
+
+    The exit code is 1 if a survey fails; the other surveys are still predicted.
+    """
+    from scenenet.core.outputs import check_outputs, check_space
+    from scenenet.core.scratch import temporary_directory
+    from scenenet.models.model_file import read_model
+    from scenenet.pointcloud import survey_in_metres
+    from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.writers import PredictionFiles, predict_to_files, space_needed
+
+    files = [PredictionFiles.of(survey, out) for survey in surveys]
+    outputs = [o for f, survey in zip(files, surveys, strict=True) for o in f.outputs(survey)]
+    check_outputs(outputs, [*surveys, model], overwrite=overwrite)
+    read_model(model)[1].threshold()
+    failures = Failures()
+    seen = failures.look_at(surveys, survey_in_metres)
+    needed = [space_needed(survey, info.n_points) for survey, info in seen.items()]
+    results, scratch = sum(n[0] for n in needed), max((n[1] for n in needed), default=0)
+    check_space({out: results, temporary_directory(): scratch})
     settings = PredictSettings(voxel_size=voxel_size)
+    detection = detection_settings(min_conductor)
     summaries = []
-    for survey in surveys:
-        target = out / f"{survey.stem.removesuffix('.copc')}.laz"
-        if target.resolve() == survey.resolve():
-            raise InputError(
-                "the result would overwrite the survey", file=survey, remedy="Name another --out"
-            )
-        summary = predict_to_files(
-            survey,
-            model,
-            target,
-            target.with_suffix(".towers.geojson"),
-            target.with_suffix(".summary.json"),
-            settings,
-            detection_settings(min_conductor),
-        )
-        summaries.append(summary.to_json())
+    for survey, target in zip(surveys, files, strict=True):
+        if survey in seen:
+            with failures.collect():
+                summary = predict_to_files(survey, model, target, settings, detection)
+                summaries.append(summary.to_json())
     show(
         summaries,
         as_json,
@@ -75,3 +84,4 @@ def command(
             f"{s['survey']}: {s['towers']} towers among {s['points']:,} points" for s in all_
         ],
     )
+    failures.end()

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from scenenet.cli.options import AsJson
+from scenenet.cli.options import AsJson, Overwrite
 from scenenet.cli.output import show
 
 EXAMPLES = ("scenenet synth line.laz --towers 20 --seed 1 --truth truth.laz",)
@@ -21,14 +21,20 @@ def command(
         Path | None,
         typer.Option(help="Second survey to write, with the labels before annotation noise."),
     ] = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Make a synthetic survey of a power line, labelled with EDP class codes.
 
     The labels have the errors of hand-made labels; --truth keeps a copy without them.
-    """
-    from scenenet.synthetic import SyntheticSettings, make_survey
 
+    A file that exists is replaced only if it is a synthetic survey.
+    """
+    from scenenet.core.outputs import Output, check_outputs
+    from scenenet.synthetic import SyntheticSettings, is_synthetic_survey, make_survey
+
+    outputs = [Output(path, is_synthetic_survey) for path in (out, truth) if path is not None]
+    check_outputs(outputs, [], overwrite=overwrite)
     settings = SyntheticSettings(towers=towers, seed=seed)
     summary = make_survey(settings, out, truth=truth, progress=out.name)
     show(summary, as_json, lambda s: [f"{out}: {s['points']:,} points, {towers} towers"])

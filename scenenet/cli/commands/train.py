@@ -7,11 +7,13 @@ from typing import Annotated
 
 import typer
 
+from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
     Kinds,
     LabelCodes,
     Labelled,
+    Overwrite,
     Protocols,
     Resolution,
     cube,
@@ -74,6 +76,7 @@ def command(
             f"{presets.VALIDATION_SHARE:g} for other models]",
         ),
     ] = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Train a model on labelled surveys or crops.
@@ -81,11 +84,15 @@ def command(
     Surveys are cut into crops around their labelled towers.
 
     Each seed gives a model. Its threshold tau is chosen by F0.5, and the model with the best F0.5
-    is written to --out.
+    is written to --out. A file that exists is replaced only if it is a model.
+
+    The exit code is 1 if a file fails; the model is trained on the other files.
     """
     from scenenet.cli.labelled_files import train_files
     from scenenet.core.files import digest
+    from scenenet.core.outputs import Output, check_outputs
     from scenenet.core.provenance import package_version
+    from scenenet.models.model_file import is_model_file
 
     ending = ".json" if kind.value == "scenenet" else ".safetensors"
     if out.suffix != ending:
@@ -97,6 +104,8 @@ def command(
         raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None
     if validation is None:
         validation = presets.validation_share(kind.value, protocol.value)
+    check_outputs([Output(out, is_model_file)], labelled, overwrite=overwrite)
+    failures = Failures()
     result = train_files(
         labelled,
         codes.value,
@@ -108,8 +117,9 @@ def command(
         {
             "config": digest(settings.model_dump()),
             "version": package_version(),
-            "files": [path.name for path in labelled],
         },
         out,
+        failures,
     )
     show(result, as_json, training_lines)
+    failures.end()

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,7 @@ import pandas as pd
 
 from scenenet.baselines.voxel_features import FEATURES, voxel_features
 from scenenet.core.errors import InputError
+from scenenet.core.scratch import scratch_folder
 from scenenet.dataset.crops import CropSettings, cut_crops, read_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.voxels import VoxelGrid, voxelise
@@ -46,11 +46,10 @@ REPEATS, VOXEL_REPEATS = 10, 3
 
 def synthetic_crops(settings: SyntheticSettings) -> Iterator[PointCloud]:
     """The crops of a synthetic survey, made by the stages for any survey."""
-    with tempfile.TemporaryDirectory(prefix="scenenet-") as scratch:
-        folder = Path(scratch)
+    with scratch_folder() as folder:
         survey, manifest = folder / "survey.laz", folder / "crops.json"
         make_survey(settings, survey)
-        towers = survey_towers(survey, "edp", TowerSettings())
+        towers = survey_towers(survey, "edp", TowerSettings()).towers
         cut_crops(
             "synthetic", survey, "edp", towers, CropSettings(), folder / "crops.zarr.zip", manifest
         )
@@ -161,8 +160,13 @@ def crop_separability(real: pd.DataFrame, synthetic: pd.DataFrame) -> Separabili
     return Separability(float(np.mean(scores)), float(np.std(scores)), _one_by_one(x, y))
 
 
-def voxel_separability(real: Measured, synthetic: Measured) -> tuple[Separability, Separability]:
+def voxel_separability(
+    real: Measured, synthetic: Measured, repeats: int = VOXEL_REPEATS
+) -> tuple[Separability, Separability]:
     """Separate by the voxel features of the boosted trees; the folds keep crops whole.
+
+    Args:
+        repeats: repetitions of the cross-validation, each with different folds.
 
     Returns:
         for single voxels, and for crops by the mean output over their voxels.
@@ -177,7 +181,7 @@ def voxel_separability(real: Measured, synthetic: Measured) -> tuple[Separabilit
     crops = np.unique(crop)
     is_real = crops <= real.crop.max()
     voxel_scores, crop_scores = [], []
-    for repeat in range(VOXEL_REPEATS):
+    for repeat in range(repeats):
         rng = np.random.default_rng(repeat)
         fold = np.empty(len(crops), int)
         for kind in (is_real, ~is_real):

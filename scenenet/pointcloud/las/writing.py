@@ -71,7 +71,11 @@ def write_cloud(
 
 @contextlib.contextmanager
 def las_stream(
-    path: str | Path, crs: pyproj.CRS | None, offsets: np.ndarray, scale: float = 0.001
+    path: str | Path,
+    crs: pyproj.CRS | None,
+    offsets: np.ndarray,
+    scale: float = 0.001,
+    software: str = "scenenet",
 ) -> Iterator[Callable[[np.ndarray, np.ndarray], None]]:
     """Write a survey in parts, otherwise as ``write_las``.
 
@@ -79,8 +83,9 @@ def las_stream(
 
     Args:
         offsets: (3,) m; points must be within 2^31 ``scale`` of it.
+        software: what the header names as the software that made the file.
     """
-    with open_writer(Path(path), _header(crs, offsets, scale)) as writer:
+    with open_writer(Path(path), _header(crs, offsets, scale, software)) as writer:
 
         def write(xyz: np.ndarray, classification: np.ndarray) -> None:
             for at in range(0, len(xyz), CHUNK_POINTS):
@@ -90,11 +95,13 @@ def las_stream(
         yield write
 
 
-def _header(crs: pyproj.CRS | None, offsets: np.ndarray, scale: float) -> laspy.LasHeader:
+def _header(
+    crs: pyproj.CRS | None, offsets: np.ndarray, scale: float, software: str = "scenenet"
+) -> laspy.LasHeader:
     import laspy
 
     header = laspy.LasHeader(version="1.4", point_format=6)
-    header.system_identifier, header.generating_software = "EXTRACTION", "scenenet"
+    header.system_identifier, header.generating_software = "EXTRACTION", software
     header.creation_date = NO_DATE
     header.scales, header.offsets = np.full(3, float(scale)), np.asarray(offsets, float)
     if crs is not None:

@@ -32,7 +32,7 @@ def manifest(tmp_path_factory):
     folder = tmp_path_factory.mktemp("crossed")
     line = SyntheticSettings(towers=6, seed=4, density=12, tower_density=24)
     make_survey(line, folder / "line.laz")
-    towers = survey_towers(folder / "line.laz", "edp", TowerSettings())
+    towers = survey_towers(folder / "line.laz", "edp", TowerSettings()).towers
     crops = folder / "crops.json"
     cut_crops(
         "line", folder / "line.laz", "edp", towers, CropSettings(), folder / "crops.zarr.zip", crops
@@ -103,7 +103,7 @@ def test_one_seed_has_no_spread():
 
 def test_the_folds_of_the_real_crops_are_those_of_docs_accuracy(real_data, tmp_path):
     folder = real_data / "ts40k"
-    towers = survey_towers(folder, "edp", TowerSettings())
+    towers = survey_towers(folder, "edp", TowerSettings()).towers
     facts = cut_crops(
         "ts40k", folder, "edp", towers, CropSettings(), tmp_path / "c.zarr.zip", tmp_path / "c.json"
     )

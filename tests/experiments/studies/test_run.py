@@ -37,7 +37,7 @@ def crops(tmp_path_factory):
     folder = tmp_path_factory.mktemp("study")
     settings = SyntheticSettings(towers=7, seed=4, density=12, tower_density=24)
     make_survey(settings, folder / "line.laz")
-    towers = survey_towers(folder / "line.laz", "edp", TowerSettings())
+    towers = survey_towers(folder / "line.laz", "edp", TowerSettings()).towers
     manifest = folder / "manifest.json"
     cut_crops("line", folder / "line.laz", "edp", towers, CropSettings(),
               folder / "crops.zarr.zip", manifest)  # fmt: skip

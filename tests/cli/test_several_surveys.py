@@ -1,0 +1,51 @@
+"""A bad survey among several stops no other."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+
+@pytest.fixture
+def three(pole_survey):
+    """A good survey, a bad one and a good one."""
+    bad, good2 = pole_survey.with_name("bad.laz"), pole_survey.with_name("good2.laz")
+    bad.write_bytes(b"no survey")
+    shutil.copy(pole_survey, good2)
+    return pole_survey, bad, good2
+
+
+def test_the_surveys_after_a_bad_one_are_predicted(call, three, pole_model, tmp_path):
+    done = call("predict", *three, "--model", pole_model, "--out", tmp_path / "out", "--json")
+    assert done.code == 1
+    assert [entry["points"] > 0 for entry in json.loads(done.out)] == [True, True]
+    assert {path.stem for path in (tmp_path / "out").glob("*.laz")} == {"field", "good2"}
+    errors = [line for line in done.err.splitlines() if line.startswith("error: ")]
+    assert len(errors) == 1
+    assert "bad.laz" in errors[0]
+
+
+def test_a_survey_damaged_in_its_points_stops_no_other(call, three, pole_model, tmp_path):
+    good, bad, _ = three
+    whole = good.read_bytes()
+    bad.write_bytes(whole[: len(whole) // 2])
+    done = call("predict", bad, good, "--model", pole_model, "--out", tmp_path / "out")
+    assert done.code == 1
+    assert (tmp_path / "out" / "field.laz").exists()
+    assert not (tmp_path / "out" / "bad.laz").exists()
+
+
+def test_the_files_after_a_bad_one_are_scored(call, three, pole_model):
+    done = call("evaluate", *three, "--model", pole_model, "--codes", "edp", "--json")
+    assert done.code == 1
+    assert json.loads(done.out)["voxel"]["n_samples"] == 2
+    assert "bad.laz" in done.err
+
+
+def test_bad_files_alone_are_named_one_by_one(call, tmp_path, pole_model):
+    names = [tmp_path / "a.laz", tmp_path / "b.laz"]
+    done = call("evaluate", *names, "--model", pole_model, "--codes", "edp")
+    assert done.code == 1
+    assert [f"{name}" in done.err for name in names] == [True, True]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast, get_args
@@ -26,6 +27,9 @@ LAS_SUFFIXES = (".las", ".laz")
 SURVEY_SUFFIXES = (*LAS_SUFFIXES, ".npy", ".pt")
 RESULTS = "{results_dir}"
 """Placeholder for the result folder in a path of the sheet."""
+
+REPEATED = re.compile(r"(.+)\1{19}$")
+"""Names that Snakemake takes for an endless recursion (``PeriodicWildcardError``)."""
 
 TS40K = "ts40k"
 """Name of the survey made of the folder of TS40K samples."""
@@ -69,12 +73,17 @@ class Survey:
     origin: Origin = "file"
 
 
-def read_surveys(config: Config, root: str | Path = ".") -> list[Survey]:
+def read_surveys(
+    config: Config, root: str | Path = ".", warn: Callable[[str], None] | None = None
+) -> list[Survey]:
     """The surveys of the sheet, the TS40K folder and the inbox, in this order.
+
+    A file of the inbox that the workflow cannot use stops no other; it is left out.
 
     Args:
         config: the configuration.
         root: folder that paths are relative to.
+        warn: gets a sentence for each file that is left out; None prints it on stderr.
 
     Raises:
         InputError: something is wrong; all problems of the sheet are listed together, with the
@@ -83,7 +92,7 @@ def read_surveys(config: Config, root: str | Path = ".") -> list[Survey]:
     root = Path(root)
     surveys = [] if config.surveys is None else _read_sheet(config, root)
     surveys += _ts40k(config, root)
-    surveys += _inbox(config, root, surveys)
+    surveys += _inbox(config, root, surveys, warn or (lambda text: print(text, file=sys.stderr)))
     names: dict[str, Survey] = {}
     for survey in surveys:
         if survey.name in names:
@@ -186,6 +195,12 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
             f"survey {name!r} cannot be the name of a file: use letters, digits, '_', '-' and '.', "
             f"such as {file_name(name)!r}"
         )
+    if REPEATED.search(name):
+        problems.append(
+            f"survey {name!r} ends in 20 or more repetitions, which Snakemake refuses in a name"
+        )
+    if set("{}") & set(path):
+        problems.append(f"{path}: Snakemake reads {{ and }} in a path as a wildcard")
     problems += _unknown("codes", codes, tuple(SCHEMES))
     problems += _unknown("role", role, get_args(Role))
     made = {
@@ -245,19 +260,53 @@ def _ts40k(config: Config, root: Path) -> Iterator[Survey]:
     yield Survey(TS40K, config.ts40k_dir, config.ts40k_codes, "train", "ts40k")
 
 
-def _inbox(config: Config, root: Path, known: list[Survey]) -> Iterator[Survey]:
+def _inbox(
+    config: Config, root: Path, known: list[Survey], warn: Callable[[str], None]
+) -> Iterator[Survey]:
     """LAS and LAZ files of the inbox that the sheet does not name. Hidden files are skipped: copy
     programs write to a hidden file until they have finished."""
     if config.new_surveys.folder is None or not (root / config.new_surveys.folder).is_dir():
         return
     listed = {(root / survey.path).resolve() for survey in known}
-    for file in sorted((root / config.new_surveys.folder).iterdir()):
-        if file.name.startswith(".") or file.suffix.lower() not in LAS_SUFFIXES:
-            continue
-        if file.resolve() not in listed:
-            path = str(Path(config.new_surveys.folder) / file.name)
-            stem = file.stem.removesuffix(".copc")
-            yield Survey(file_name(stem), path, config.new_surveys.codes, "new")
+    files = [
+        file
+        for file in sorted((root / config.new_surveys.folder).iterdir())
+        if not file.name.startswith(".")
+        and file.suffix.lower() in LAS_SUFFIXES
+        and file.resolve() not in listed
+    ]
+    owners: dict[str, list[str]] = {survey.name: [survey.path] for survey in known}
+    for file in files:
+        owners.setdefault(_inbox_name(file), []).append(file.name)
+    for file in files:
+        path, name = str(Path(config.new_surveys.folder) / file.name), _inbox_name(file)
+        reason = _why_left_out(file, name, owners[name])
+        if reason is None:
+            yield Survey(name, path, config.new_surveys.codes, "new")
+        else:
+            warn(f"left out: {path}: {reason}")
+
+
+def _inbox_name(file: Path) -> str:
+    return file_name(file.stem.removesuffix(".copc"))
+
+
+def _why_left_out(file: Path, name: str, owners: list[str]) -> str | None:
+    """Why a file of the inbox cannot be a survey of the workflow; None if it can.
+
+    Args:
+        owners: the files whose survey would be called ``name``. None of those in the inbox is used,
+            as one would replace the results of the other.
+    """
+    if not file.exists():
+        return f"it is a link to {file.readlink()}, which does not exist. Mend or remove the link"
+    if set("{}") & set(str(file)):
+        return "Snakemake reads { and } in a path as a wildcard. Rename the file"
+    if REPEATED.search(name):
+        return "Snakemake refuses a name that ends in 20 or more repetitions. Rename the file"
+    if len(owners) > 1:
+        return f"two surveys would be called {name!r}: {' and '.join(owners)}. Rename one of them"
+    return None
 
 
 def file_name(text: str) -> str:

@@ -168,10 +168,41 @@ def test_an_inbox_that_is_not_there_is_empty(root):
     assert read(root, new_surveys={"folder": "nowhere"}) == []
 
 
-def test_two_surveys_of_one_name_are_refused_wherever_they_come_from(root):
+def test_files_of_the_inbox_with_one_name_are_left_out_and_stop_no_other(root, capsys):
     (root / "inbox" / "new_one.las").write_bytes(b"")
-    message = complaint(root, new_surveys={"folder": "inbox"})
-    assert "two surveys are called 'new_one': inbox/new one.laz and inbox/new_one.las" in message
+    (root / "inbox" / "other.las").write_bytes(b"")
+    assert [s.name for s in read(root, new_surveys={"folder": "inbox"})] == ["other"]
+    warnings = capsys.readouterr().err.splitlines()
+    assert len(warnings) == 2
+    assert "two surveys would be called 'new_one': new one.laz and new_one.las" in warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("a{b}.las", "reads { and } in a path as a wildcard"),
+        ("ab" * 20 + ".las", "20 or more repetitions"),
+    ],
+)
+def test_a_name_that_snakemake_cannot_use_is_left_out(root, capsys, name, reason):
+    (root / "inbox" / name).write_bytes(b"")
+    assert [s.name for s in read(root, new_surveys={"folder": "inbox"})] == ["new_one"]
+    error = capsys.readouterr().err
+    assert f"left out: inbox/{name}" in error
+    assert reason in error
+
+
+def test_a_dead_link_in_the_inbox_is_left_out(root, capsys):
+    (root / "inbox" / "gone.laz").symlink_to("disk/gone.laz")
+    assert [s.name for s in read(root, new_surveys={"folder": "inbox"})] == ["new_one"]
+    message = "left out: inbox/gone.laz: it is a link to disk/gone.laz, which does not exist"
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("row", ["ab" * 20 + "\tdata/north.laz", "mine\tdata/a{b}.laz"])
+def test_a_row_that_snakemake_cannot_use_is_a_problem_of_the_sheet(root, row):
+    (root / "data" / "a{b}.laz").write_bytes(b"")
+    assert "Snakemake" in complaint(root, f"{row}\tedp\tnew")
 
 
 def test_a_folder_of_ts40k_samples_is_one_survey(root):

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import yaml
 from snakemake.exceptions import WorkflowError
+from snakemake.logging import logger
 
 from scenenet.core.code_hash import code_hash
 from scenenet.config.schema import load, merged
@@ -38,6 +39,12 @@ def own_file(path):
     """A file that the configuration names, or the one that comes with the workflow if the working
     directory has none. It stays where it is when a module is used with a prefix."""
     return local(path if Path(path).exists() else str(PROJECT / path))
+
+
+def warn_once(text):
+    """Show a warning, but not again in the processes of the jobs."""
+    if workflow.is_main_process:
+        logger.warning(text)
 
 
 def any_of(names):
@@ -81,7 +88,10 @@ def source_print(survey):
     """What identifies a survey: its fingerprint, or the recipe of a synthetic one."""
     if SURVEYS[survey].origin == "synthetic":
         return f"recipe:{digest(synthetic_settings(Path(SURVEYS[survey].path).stem))}"
-    return fingerprint(SURVEYS[survey].path, settings.content_below * 1024**2)
+    try:
+        return fingerprint(SURVEYS[survey].path, settings.content_below * 1024**2)
+    except InputError:
+        return "unreadable"  # its own jobs fail and say why, and no other
 
 
 def synthetic_settings(name):
@@ -118,7 +128,7 @@ BOOSTED_TREES = "boosted.trees"
 
 try:
     settings = load(with_defaults(config))
-    SURVEYS = {survey.name: survey for survey in read_surveys(settings)}
+    SURVEYS = {survey.name: survey for survey in read_surveys(settings, warn=warn_once)}
     THESIS = {"thesis": fingerprint(own_file(settings.thesis))}
 except InputError as error:
     raise WorkflowError(str(error)) from None

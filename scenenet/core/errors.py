@@ -72,6 +72,9 @@ def output_error(path: str | Path, reason: OSError, what: str = "the file") -> O
     """The message for an error of the storage under ``path``; None for other errors."""
     if reason.errno not in _STORAGE:
         return None
+    path = Path(path)
+    if path.parent.name.startswith(f".{path.name}."):  # the temporary name of a result
+        path = path.parent.parent / path.name
     problem, remedy = _STORAGE[reason.errno]
     if reason.errno in (errno.ENOSPC, errno.EDQUOT):
         problem += f" ({free_space(path) / 1e6:,.1f} MB are free)"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import resource
 import shutil
 
@@ -153,5 +154,6 @@ def test_a_file_that_cannot_grow_ends_with_a_message_and_no_result(
     assert done.code == 1
     assert "cannot be written" in done.err
     assert "limit on file sizes" in done.err
+    assert not re.search(r"/\.field\.", done.err)
     assert "Traceback" not in done.err
     assert not [path for path in out.rglob("*") if path.is_file()]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import datetime
+import io
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ from scenenet.pointcloud.las.extra_dimensions import checked, new_dimensions
 if TYPE_CHECKING:
     import laspy
     import pyproj
+    from typing_extensions import Buffer
 
 CHUNK_POINTS = 500_000
 INT32_MAX = np.iinfo(np.int32).max
@@ -148,12 +150,36 @@ def open_writer(path: Path, header: laspy.LasHeader) -> Iterator[laspy.LasWriter
             if entry.data_type:  # 0 means plain bytes, whose options are a count
                 # laspy takes the first point of a chunk as its minimum and maximum.
                 entry.options &= ~(entry.MIN_BIT_MASK | entry.MAX_BIT_MASK)
-    with (
-        atomic(path) as partial,
-        # Text of other writers that is not ASCII is kept as bytes.
-        laspy.open(partial, mode="w", header=header, encoding_errors="surrogateescape") as writer,
-    ):
-        yield writer
+    with atomic(path) as partial, _Stream(partial) as stream:
+        try:
+            with laspy.open(
+                stream,
+                mode="w",
+                closefd=False,
+                do_compress=suffix == ".laz",
+                header=header,
+                encoding_errors="surrogateescape",  # keeps text that is not ASCII as bytes
+            ) as writer:
+                yield writer
+        except Exception as error:
+            if stream.error is not None:
+                raise stream.error from error
+            raise
+
+
+class _Stream(io.BufferedWriter):
+    """A file that remembers why it could not be written: the compressor does not say why."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path, "w"))
+        self.error: OSError | None = None
+
+    def write(self, data: Buffer, /) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            self.error = error
+            raise
 
 
 def _offsets(path: Path, xyz: np.ndarray, scale: float) -> np.ndarray:

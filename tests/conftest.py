@@ -35,27 +35,26 @@ pytest_plugins = ["fixtures.noisy_lines", "fixtures.result_folder"]
 ROOT = Path(__file__).resolve().parent.parent
 
 
-def _group(file: str) -> str:
-    """The tests of the workflow share one finished run; those of any other file share its
-    fixtures."""
-    return "workflow" if file.startswith("tests/workflow/") else file
+LONGEST = ("tests/workflow/test_captions.py", "tests/tracking/", "tests/workflow/", "tests/cli/")
+"""Tests to begin with, so that no worker is left with a long file at the end. The first one makes
+the finished run of the workflow; the second keeps the other worker busy meanwhile."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the tests of the workflow, which take the longest."""
-    items.sort(key=lambda item: _group(item.nodeid) != "workflow")
+    """Put the longest tests first."""
+
+    def rank(item: pytest.Item) -> int:
+        return next((n for n, start in enumerate(LONGEST) if item.nodeid.startswith(start)), 9)
+
+    items.sort(key=rank)
 
 
 @pytest.hookimpl(optionalhook=True)  # pytest-xdist may be missing
 def pytest_xdist_make_scheduler(config: pytest.Config, log):
-    """Give each group to one worker, so that no fixture of a session is made twice."""
-    from xdist.scheduler import LoadScopeScheduling
+    """Give each file to one worker, so that no fixture of a module is made twice."""
+    from xdist.scheduler import LoadFileScheduling
 
-    class ByGroup(LoadScopeScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            return _group(nodeid.split("::")[0])
-
-    return ByGroup(config, log)
+    return LoadFileScheduling(config, log)
 
 
 PLACE = np.array([500_000.0, 4_630_000.0, 100.0])

@@ -37,13 +37,13 @@ def trained(crops):
     return fit_and_tune(crops[:3], FEW, 0, {"why": "test"})
 
 
-def test_a_pole_in_a_crop_never_seen_is_found(trained, crops):
+def test_a_pole_in_an_unseen_crop_is_found(trained, crops):
     model, _ = trained
     probability, truth = model.probabilities(crops[3])
     assert confusion(probability, truth, model.threshold()).f05 > 0.9
 
 
-def test_the_trees_answer_as_scikit_learn_does(crops):
+def test_the_trees_give_the_probabilities_of_scikit_learn(crops):
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     rng = np.random.default_rng(0)
@@ -60,7 +60,7 @@ def test_the_trees_answer_as_scikit_learn_does(crops):
     np.testing.assert_allclose(model.of_features(features), expected, rtol=1e-5)
 
 
-def test_empty_voxels_are_no_towers(trained, crops):
+def test_empty_voxels_are_never_tower(trained, crops):
     model, _ = trained
     probability, truth = model.probabilities(crops[3])
     assert probability.shape == truth.shape == (crops[3].grid.n_voxels,)
@@ -71,7 +71,7 @@ def test_empty_voxels_are_no_towers(trained, crops):
     assert set(np.flatnonzero(truth)) == set(crops[3].tower_index())
 
 
-def test_the_seed_decides(crops):
+def test_the_seed_determines_the_trees(crops):
     one, same, other = (fit(crops[:2], FEW, seed) for seed in (3, 3, 4))
     for name in one.trees._fields:
         np.testing.assert_array_equal(getattr(one.trees, name), getattr(same.trees, name))
@@ -86,7 +86,7 @@ def test_tau_is_where_f05_is_highest_on_validation(crops):
     assert confusion(probability, truth, model.threshold()).f05 == curve.best()[1].f05
 
 
-def test_tau_without_validation_is_chosen_on_crops_left_out(trained, crops):
+def test_tau_without_validation_is_chosen_by_leave_one_out(trained, crops):
     model, curve = trained
     expected = ThresholdCurve.empty()
     for out in range(3):
@@ -99,7 +99,7 @@ def test_tau_without_validation_is_chosen_on_crops_left_out(trained, crops):
     np.testing.assert_array_equal(model.of_occupied(crops[3]), whole.of_occupied(crops[3]))
 
 
-def test_one_crop_cannot_be_left_out(crops):
+def test_leave_one_out_refuses_a_single_crop(crops):
     with pytest.raises(InputError, match="two crops or more"):
         fit_and_tune(crops[:1], FEW, 0)
 
@@ -112,7 +112,7 @@ def test_a_tower_weight_is_the_weight_of_all_towers_together(crops):
     assert heavy.odds == pytest.approx(np.log(10.0))
 
 
-def test_crops_without_a_tower_teach_nothing(crops):
+def test_training_crops_without_a_tower_are_refused(crops):
     bare = [replace(crop, tower=np.zeros(len(crop.index), bool)) for crop in crops]
     with pytest.raises(InputError, match=r"the 4 training crops have no tower voxel"):
         fit(bare, FEW, 0)
@@ -123,12 +123,12 @@ def test_crops_without_a_tower_teach_nothing(crops):
         fit([], FEW, 0)
 
 
-def test_untuned_it_has_no_threshold(crops):
+def test_an_untuned_baseline_has_no_threshold(crops):
     with pytest.raises(InputError, match="no detection threshold"):
         fit(crops[:2], FEW, 0).threshold()
 
 
-def test_learnt_numbers_are_those_of_splits_and_leaves(trained):
+def test_the_parameters_are_those_of_splits_and_leaves(trained):
     model, _ = trained
     leaves = int((model.trees.feature < 0).sum())
     splits = leaves - len(model.trees.root)  # a binary tree has one leaf more than splits
@@ -139,7 +139,7 @@ FOLDS = (("sample_575", "sample_578"), ("sample_584", "sample_588"), ("sample_59
 """Leave-two-out over the six real crops, in the order of their names."""
 
 
-def test_real_crops_are_answered_better_than_by_simple_features(real_samples):
+def test_it_beats_simple_features_on_real_crops(real_samples):
     """A first look with 22 simple features had P 0.86, R 0.245, F0.5 0.573 on other crops."""
     total = Confusion()
     for test in FOLDS:
@@ -151,7 +151,7 @@ def test_real_crops_are_answered_better_than_by_simple_features(real_samples):
     assert total.f05 > 0.65
 
 
-def test_features_are_what_it_answers_from(trained, crops):
+def test_probabilities_follow_from_the_features(trained, crops):
     model, _ = trained
     features = voxel_features(crops[3])
     np.testing.assert_array_equal(model.of_features(features), model.of_occupied(crops[3]))

@@ -52,12 +52,12 @@ def at(sample: VoxelSample, xyz) -> dict[str, float]:
     return {name: float(column[row]) for name, column in table(sample).items()}
 
 
-def test_each_feature_has_a_name_of_its_own_a_unit_and_a_meaning():
+def test_each_feature_has_a_unique_name_a_unit_and_a_meaning():
     assert len(set(NAMES)) == len(NAMES) <= 26
     assert all(f.unit in {"m", "m^2", "1"} and f.meaning for f in FEATURES)
 
 
-def test_a_row_a_voxel_and_a_column_a_feature():
+def test_a_row_per_voxel_and_a_column_per_feature():
     sample = sample_of(flat_ground(), pole(), wire())
     features = voxel_features(sample)
     assert features.shape == (len(sample.index), len(FEATURES))
@@ -65,7 +65,7 @@ def test_a_row_a_voxel_and_a_column_a_feature():
     assert np.isfinite(features).all()
 
 
-def test_a_pole_is_as_tall_as_it_is():
+def test_the_height_of_a_pole_is_measured():
     middle = at(sample_of(flat_ground(), pole()), (20.1, 20.1, 7.5))
     assert middle["height"] == pytest.approx(7.5, abs=0.5)
     assert middle["run_1"] == middle["run_2"] == POLE
@@ -83,7 +83,7 @@ def test_a_pole_is_as_tall_as_it_is():
     assert middle["conductor_6"] == 0
 
 
-def test_ground_is_ground():
+def test_ground_has_no_height():
     ground = at(sample_of(flat_ground(), pole()), (5.5, 5.5, 0.5))
     assert ground["height"] == pytest.approx(0.5)
     assert ground["run_2"] == 1
@@ -91,7 +91,7 @@ def test_ground_is_ground():
     assert ground["tall_6"] == 0
 
 
-def test_wires_are_seen_from_the_pole_and_from_themselves():
+def test_conductors_are_measured_from_the_pole_and_from_themselves():
     sample = sample_of(flat_ground(), pole(), wire())
     body = at(sample, (20.1, 20.1, 5.5))
     assert body["conductor_distance"] <= 4  # near the pole the wire's surroundings are no line
@@ -102,14 +102,14 @@ def test_wires_are_seen_from_the_pole_and_from_themselves():
     assert aside["conductor_6"] == 0
 
 
-def test_a_stray_return_high_above_is_no_top():
+def test_a_stray_return_does_not_raise_the_top():
     bird = np.array([[20.1, 20.1, 38.0]])
     with_bird = at(sample_of(flat_ground(), pole(), bird), (20.1, 20.1, 7.5))
     without = at(sample_of(flat_ground(), pole()), (20.1, 20.1, 7.5))
     assert with_bird == pytest.approx(without, rel=0.02)  # the bird counts as a point
 
 
-def test_height_is_above_the_ground_on_a_slope_too():
+def test_height_is_above_the_ground_also_on_a_slope():
     slope = 0.3
     sample = sample_of(flat_ground(slope), pole(foot=slope * 20.1))
     body = at(sample, (20.1, 20.1, slope * 20.1 + 7.5))
@@ -118,14 +118,14 @@ def test_height_is_above_the_ground_on_a_slope_too():
     assert np.median(np.abs(ground)) < 1
 
 
-def test_a_hole_in_the_ground_does_not_raise_what_is_beside_it():
+def test_a_hole_in_the_ground_does_not_raise_its_neighbours():
     pit = np.array([[18.5, 20.1, -5.0]])
     grid = {"origin": (0.0, 0.0, -8.0), "shape": (40, 40, 40)}
     middle = at(sample_of(flat_ground(), pole(), pit, **grid), (20.1, 20.1, 7.5))
     assert middle["height"] == pytest.approx(7.5, abs=0.5)
 
 
-def test_labels_and_place_are_not_looked_at():
+def test_features_do_not_depend_on_labels_or_position():
     sample = sample_of(flat_ground(), pole(), wire())
     expected = voxel_features(sample)
     labelled = replace(sample, tower=np.ones(len(sample.index), bool))
@@ -164,7 +164,7 @@ def test_half_the_voxel_size_gives_about_the_same():
     assert fine["conductor_distance"] == pytest.approx(coarse["conductor_distance"], abs=1.0)
 
 
-def test_a_run_goes_on_over_a_gap_of_a_metre_and_not_of_two():
+def test_a_run_continues_over_a_gap_of_one_metre_but_not_of_two():
     def run(missing: tuple[float, float]) -> float:
         body = pole()
         body = body[(body[:, 2] < missing[0]) | (body[:, 2] >= missing[1])]
@@ -175,7 +175,7 @@ def test_a_run_goes_on_over_a_gap_of_a_metre_and_not_of_two():
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 1), (1, 3, 2), (5, 4, 3)])
-def test_small_grids_have_features(shape):
+def test_features_exist_on_small_grids(shape):
     n = int(np.prod(shape))
     grid = VoxelGrid((0.0, 0.0, 0.0), 1.0, shape)
     for index in ([0], range(n)):
@@ -206,7 +206,7 @@ MEDIAN_OFF = {
 
 
 @pytest.mark.parametrize("name", ["sample_575", "sample_593"])
-def test_real_voxels_agree_with_their_parts(real_data, name):
+def test_features_of_real_voxels_agree_between_resolutions(real_data, name):
     from scenenet.pointcloud import read
 
     cloud = read(real_data / "ts40k" / f"{name}.npy", "edp")

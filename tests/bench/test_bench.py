@@ -34,7 +34,7 @@ def samples(crops):
 
 
 @pytest.mark.parametrize("size", [(9, 9, 9), (9, 5, 5), (12, 5, 5), (4, 1, 6)])
-def test_all_convolutions_give_the_same(samples, size):
+def test_all_convolutions_give_the_same_result(samples, size):
     occupancy, _ = batch(samples[:1], "presence")
     kernels = torch.randn((3, *size), generator=torch.Generator().manual_seed(0))
     ours = convolve(occupancy, kernels.sum(0))
@@ -47,13 +47,13 @@ def test_both_training_steps_have_the_same_error(samples):
     model = SceneNet(kernel_size=(5, 3, 3), generator=torch.Generator().manual_seed(1))
     occupancy, towers = batch(samples, "presence")
     kernel, _ = model.observer()
-    theirs = peers.dense_error(occupancy.dense(), kernel, towers, (0.2, 9.0))
+    dense = peers.dense_error(occupancy.dense(), kernel, towers, (0.2, 9.0))
     ours = fidelity(model, occupancy, towers, VoxelWeights(0.2, 9.0))
-    torch.testing.assert_close(ours, theirs)
+    torch.testing.assert_close(ours, dense)
     ours.backward()
     ours_gradient = [p.grad.clone() for p in model.parameters()]
     model.zero_grad()
-    theirs.backward()
+    dense.backward()
     for a, b in zip(ours_gradient, [p.grad for p in model.parameters()], strict=True):
         torch.testing.assert_close(a, b, rtol=1e-4, atol=1e-6)
 
@@ -68,7 +68,7 @@ def test_both_voxelisations_find_the_same_voxels(crops):
     assert set(np.flatnonzero(truth)) >= set(sample.tower_index()[:-1])
 
 
-def test_a_median_is_of_as_many_runs_as_asked_for_and_slow_ways_are_run_once():
+def test_medians_use_the_requested_runs_and_slow_tasks_run_once():
     calls = {"fast": 0, "slow": 0}
 
     def run(name, seconds=0.0):
@@ -83,7 +83,7 @@ def test_a_median_is_of_as_many_runs_as_asked_for_and_slow_ways_are_run_once():
     assert times["slow"] >= 1050
 
 
-def test_sections_have_what_their_readers_rely_on(samples, crops, monkeypatch):
+def test_the_result_has_the_keys_that_the_report_reads(samples, crops, monkeypatch):
     monkeypatch.setattr(sections, "SIZES", ((9, 5, 5),))
     monkeypatch.setattr(sections, "RESOLUTIONS", (32,))
     section = sections.convolution({32: samples}, repetitions=2)

@@ -56,7 +56,7 @@ def model(survey, tmp_path_factory) -> Path:
     return out
 
 
-def test_the_protocol_of_the_thesis_can_be_asked_for(survey, tmp_path):
+def test_the_thesis_protocol_can_be_selected(survey, tmp_path):
     out = tmp_path / "thesis.json"
     made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
                     "--protocol", "thesis", "--epochs", 2, "--seeds", 1, "--json")  # fmt: skip
@@ -110,7 +110,7 @@ def test_predict_writes_the_three_files_of_a_survey(survey, model, tmp_path):
     assert json.loads(done.stdout) == [summary]
 
 
-def test_evaluate_answers_with_the_scores_of_the_contract(survey, model):
+def test_evaluate_prints_the_documented_scores(survey, model):
     done = scenenet("evaluate", survey, "--model", model, "--codes", "edp",
                     "--resolution", 32, "--json")  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -126,7 +126,7 @@ def test_evaluate_answers_with_the_scores_of_the_contract(survey, model):
     }  # fmt: skip
 
 
-def test_evaluate_at_the_models_voxel_size_looks_through_the_whole_survey(survey, model):
+def test_evaluate_at_the_models_voxel_size_detects_in_the_whole_survey(survey, model):
     done = scenenet("evaluate", survey, "--model", model, "--codes", "edp", "--fit", "metric",
                     "--json")  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -168,14 +168,14 @@ def test_a_missing_survey_ends_with_code_1_and_its_name(model, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
-def test_check_goes_on_after_a_broken_survey_and_says_so(survey, tmp_path):
+def test_check_continues_after_a_broken_survey_and_reports_it(survey, tmp_path):
     (tmp_path / "broken.laz").write_bytes(b"nothing")
     done = scenenet("check", tmp_path / "broken.laz", survey)
     assert done.returncode == 1
     assert "broken.laz" in done.stderr and "corridor.laz" in done.stdout
 
 
-def test_a_model_that_is_none_is_refused(survey, tmp_path):
+def test_a_file_that_is_not_a_model_is_refused(survey, tmp_path):
     (tmp_path / "m.json").write_text("{}")
     done = scenenet("predict", survey, "--model", tmp_path / "m.json", "--out", tmp_path / "out")
     assert done.returncode == 1
@@ -202,7 +202,7 @@ def test_wrong_calls_end_with_code_2(survey, tmp_path):
     assert ".safetensors" in cnn.stderr
 
 
-def test_a_survey_without_towers_is_not_trained_on(tmp_path):
+def test_training_on_a_survey_without_towers_is_refused(tmp_path):
     from scenenet.pointcloud import PointCloud, write_las
 
     xyz = np.random.default_rng(0).uniform(0, 30, (500, 3))
@@ -233,10 +233,10 @@ def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path
         ],
     )
     assert process.stderr is not None
-    said = process.stderr.readline()  # the survey has been read, the tiles come next
+    output = process.stderr.readline()  # the survey has been read, the tiles come next
     process.send_signal(number)
-    said += process.communicate(timeout=60)[1]
+    output += process.communicate(timeout=60)[1]
     assert process.returncode == 128 + number
-    assert "no incomplete file was left" in said and "Traceback" not in said
+    assert "no incomplete file was left" in output and "Traceback" not in output
     assert list(tmp_path.iterdir()) in ([], [out])
     assert not out.exists() or list(out.iterdir()) == []

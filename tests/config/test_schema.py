@@ -59,12 +59,12 @@ def test_the_default_protocol_is_that_of_the_thesis(project_root):
     assert len(config.seeds) >= 5
 
 
-def test_all_settings_written_down_are_the_same_configuration(project_root):
+def test_a_configuration_with_all_defaults_written_out_is_the_same(project_root):
     config = load(shipped(project_root, "test.yaml"))
     assert load(config.plain()) == config
 
 
-def test_common_training_settings_are_those_of_a_model_that_says_nothing_else():
+def test_common_training_settings_apply_unless_a_model_overrides_them():
     own = {"name": "slow", "kind": "scenenet", "training": {"epochs": 200, "loss": {"alpha": 1}}}
     config = load(
         raw(
@@ -78,13 +78,13 @@ def test_common_training_settings_are_those_of_a_model_that_says_nothing_else():
     assert (slow.loss.alpha, slow.loss.epsilon) == (1, 0.5)
 
 
-def test_a_typo_is_refused_with_the_line_as_it_should_be():
+def test_a_typo_is_refused_with_the_corrected_line():
     message = complaint(voxels={"resolutoin": 128})
     assert "voxels.resolutoin: there is no such setting. Did you mean 'resolution'?" in message
     assert message.endswith("      voxels:\n        resolution: 128")
 
 
-def test_a_key_like_no_other_is_refused_with_those_there_are():
+def test_an_unknown_key_is_refused_with_the_known_ones():
     message = complaint(zzz=1)
     assert "zzz: there is no such setting" in message
     assert "voxels" in message
@@ -192,7 +192,7 @@ def test_only_settings_with_an_effect_are_recorded():
         ({"training": {"init": "field"}}, "models[0].training", "write init: informed"),
     ],
 )
-def test_a_setting_under_its_name_in_version_0_1_is_told_its_new_name(old, key, new):
+def test_the_name_of_a_setting_in_version_0_1_is_refused_with_the_new_one(old, key, new):
     text = complaint(models=[{"name": "m", "kind": "scenenet", **old}])
     assert f"{key}: " in text and new in text
 
@@ -204,7 +204,7 @@ def test_the_schemas_are_those_of_the_models(project_root, name):
     assert written == config_reference.schemas()[name], remedy
 
 
-def test_the_schema_takes_the_shipped_configuration_and_no_typo(project_root):
+def test_the_schema_accepts_the_shipped_configuration_and_refuses_a_typo(project_root):
     schema = config_reference.schemas()["config.schema.json"]
     settings = shipped(project_root, "config.yaml")
     jsonschema.validate(settings, schema)
@@ -218,7 +218,7 @@ def test_the_table_of_settings_is_that_of_the_models(project_root):
     assert written == config_reference.reference(), remedy
 
 
-def test_every_setting_says_what_it_is():
+def test_every_setting_has_a_description():
     missing = [
         f"{title}: {key}"
         for title, model in config_reference.SECTIONS.items()
@@ -228,7 +228,7 @@ def test_every_setting_says_what_it_is():
     assert missing == []
 
 
-def test_defaults_alone_are_no_configuration():
-    """What is trained has to be said; everything else has a default."""
+def test_only_models_and_seeds_are_required():
+    """Models and seeds have no default; everything else has one."""
     required = [name for name, field in Config.model_fields.items() if field.is_required()]
     assert required == ["models", "seeds"]

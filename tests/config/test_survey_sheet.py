@@ -59,17 +59,17 @@ def test_a_sheet_saved_by_a_spreadsheet_is_read(root):
     assert read(root, "north\tdata/north.laz\tedp\ttrain\r", header=f"﻿{HEADER}\r")
 
 
-def test_a_synthetic_survey_need_not_be_there_yet(root):
+def test_a_synthetic_survey_need_not_exist_yet(root):
     (survey,) = read(root, "corridor\t{results_dir}/synthetic/made.laz\tedp\ttrain")
     assert survey == Survey("corridor", "results/synthetic/made.laz", "edp", "train", "synthetic")
 
 
-def test_the_place_of_a_synthetic_survey_follows_the_result_folder(root):
+def test_the_path_of_a_synthetic_survey_follows_the_result_folder(root):
     row = "corridor\t{results_dir}/synthetic/made.laz\tedp\ttrain"
     assert read(root, row, results_dir="elsewhere")[0].path == "elsewhere/synthetic/made.laz"
 
 
-def test_an_absolute_path_is_taken_as_it_is(root):
+def test_an_absolute_path_is_not_changed(root):
     path = str(root / "data" / "north.laz")
     assert read(root, f"north\t{path}\tedp\ttrain")[0].path == path
 
@@ -91,7 +91,7 @@ def test_an_absolute_path_is_taken_as_it_is(root):
         ("x\t{results_dir}/synthetic/mode.laz\tedp\ttrain", "{results_dir}/synthetic/made.laz?"),
     ],
 )
-def test_a_row_that_is_wrong_is_named_by_its_line(root, row, expected):
+def test_a_wrong_row_is_named_by_its_line(root, row, expected):
     message = complaint(root, "", row)
     assert message.startswith("surveys.tsv: one problem in the survey sheet\n  line 3: ")
     assert expected in message
@@ -111,12 +111,12 @@ def test_all_problems_are_reported_together(root):
     assert "line 4: data/gone.laz is not there" in message
 
 
-def test_every_scheme_of_class_codes_can_stand_in_the_sheet(root):
+def test_every_class_scheme_is_accepted_in_the_sheet(root):
     assert get_args(Codes) == tuple(SCHEMES)
     assert read(root, "samples\tts40k\tts40k\ttrain")[0].codes == "ts40k"
 
 
-def test_a_file_cannot_be_trained_on_under_two_names(root):
+def test_a_training_file_with_two_names_is_refused(root):
     """Its crops would be among those to train on and those to test on."""
     rows = ["a\tdata/north.laz\tedp\ttrain", "b\tdata/../data/north.laz\tedp\ttrain"]
     assert "line 3: the file" in complaint(root, *rows)
@@ -139,7 +139,7 @@ def test_the_message_about_an_empty_sheet_names_the_columns(root):
     assert "survey, path, codes, role" in complaint(root, header="# nothing")
 
 
-def test_a_sheet_that_is_not_there_is_named(root):
+def test_a_missing_sheet_is_named(root):
     assert "gone.tsv: the survey sheet cannot be read" in complaint(root, surveys="gone.tsv")
 
 
@@ -150,7 +150,7 @@ def test_every_survey_in_the_inbox_is_new(root):
     ]
 
 
-def test_the_inbox_passes_over_what_is_no_survey_and_what_is_still_copied(root):
+def test_the_inbox_skips_other_files_and_incomplete_copies(root):
     for name in ("notes.txt", ".half.laz", "sub/deep.laz"):
         (root / "inbox" / name).parent.mkdir(exist_ok=True)
         (root / "inbox" / name).write_bytes(b"")
@@ -164,7 +164,7 @@ def test_a_survey_of_the_sheet_is_not_taken_from_the_inbox_again(root):
     assert [s.name for s in read(root, row, new_surveys={"folder": "inbox"})] == ["mine"]
 
 
-def test_an_inbox_that_is_not_there_is_empty(root):
+def test_a_missing_inbox_is_empty(root):
     assert read(root, new_surveys={"folder": "nowhere"}) == []
 
 
@@ -221,5 +221,5 @@ def test_a_folder_without_ts40k_samples_is_refused(root, folder):
 @pytest.mark.parametrize(
     ("text", "expected"), [("a b/c", "a_b_c"), ("--x..", "x"), ("évora", "vora"), ("  ", "survey")]
 )
-def test_names_are_made_fit_for_files(text, expected):
+def test_names_become_valid_file_names(text, expected):
     assert file_name(text) == expected

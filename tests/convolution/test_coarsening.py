@@ -19,7 +19,7 @@ def test_a_block_is_about_a_metre(voxel_size, edge):
 
 
 @given(st.integers(0, 500), st.integers(1, 4))
-def test_a_block_is_occupied_where_any_of_its_voxels_is(seed, edge):
+def test_a_block_is_occupied_if_any_of_its_voxels_is(seed, edge):
     rng = np.random.default_rng(seed)
     shape = (5, 7, 6)
     volumes = [rng.random(shape) < 0.1 for _ in range(2)]

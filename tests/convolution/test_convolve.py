@@ -42,7 +42,7 @@ def dense_convolution(occupancy: Occupancy, kernel: torch.Tensor) -> torch.Tenso
     shapes, sizes, st.integers(0, 3), st.sampled_from([0.0, 0.1, 0.7, 1.0]), st.booleans(),
     st.integers(0, 99),
 )  # fmt: skip
-def test_it_is_conv3d_for_any_shape_and_kernel_size(shape, size, n_grids, share, valued, seed):
+def test_it_equals_conv3d_for_any_shape_and_kernel_size(shape, size, n_grids, share, valued, seed):
     occupancy = grids(shape, n_grids, share, seed, valued=valued)
     kernel = torch.from_numpy(np.random.default_rng(seed).normal(size=size))
     answer = convolve(occupancy, kernel)
@@ -54,7 +54,7 @@ def test_it_is_conv3d_for_any_shape_and_kernel_size(shape, size, n_grids, share,
 
 
 @given(shapes, sizes, st.booleans(), st.integers(0, 99))
-def test_float32_is_as_near_as_float32_can_be(shape, size, valued, seed):
+def test_the_error_in_float32_is_rounding(shape, size, valued, seed):
     occupancy = grids(shape, 2, 0.3, seed, np.float32, valued)
     kernel = torch.from_numpy(np.random.default_rng(seed).normal(size=size).astype(np.float32))
     answer = convolve(occupancy, kernel)
@@ -64,7 +64,7 @@ def test_float32_is_as_near_as_float32_can_be(shape, size, valued, seed):
 
 @pytest.mark.parametrize("resolution", [64, 128])
 @pytest.mark.parametrize("size", [(9, 9, 9), (9, 5, 5), (12, 5, 5)])
-def test_it_is_conv3d_at_the_sizes_that_are_used(resolution, size):
+def test_it_equals_conv3d_at_the_usual_sizes(resolution, size):
     occupancy = grids((resolution,) * 3, 1, 0.01, seed=3, valued=False)
     kernel = torch.from_numpy(np.random.default_rng(1).normal(size=size).astype(np.float32))
     answer, expected = convolve(occupancy, kernel), dense_convolution(occupancy, kernel)
@@ -72,7 +72,7 @@ def test_it_is_conv3d_at_the_sizes_that_are_used(resolution, size):
 
 
 @given(shapes, sizes, st.booleans(), st.integers(0, 99))
-def test_the_answers_at_the_occupied_voxels_are_those_of_the_volume(shape, size, valued, seed):
+def test_responses_at_the_occupied_voxels_are_those_of_the_volume(shape, size, valued, seed):
     occupancy = grids(shape, 2, 0.3, seed, valued=valued)
     kernels = torch.from_numpy(np.random.default_rng(seed).normal(size=(3, *size)))
     volumes = convolve(occupancy, kernels)
@@ -108,7 +108,7 @@ def test_one_voxel_spreads_the_mirrored_kernel_around_itself():
     assert convolve(one, kernel).tolist() == [[[[0.0, 3.0, 2.0, 1.0, 0.0]]]]
 
 
-def test_an_even_kernel_reaches_one_voxel_further_up():
+def test_an_even_kernel_extends_one_voxel_further_up():
     kernel = torch.tensor([1.0, 10.0]).reshape(1, 1, 2)
     one = Occupancy.of_grids([np.array([2])], [np.ones(1)], (1, 1, 5))
     # out[p] = kernel[0] x[p] + kernel[1] x[p + 1]: no answer between two voxels
@@ -116,7 +116,7 @@ def test_an_even_kernel_reaches_one_voxel_further_up():
 
 
 @given(sizes, st.tuples(*[st.integers(0, 5)] * 3), st.integers(0, 99))
-def test_a_translated_scene_gives_the_translated_answer(size, shift, seed):
+def test_a_translated_scene_gives_the_translated_response(size, shift, seed):
     scene = grids((5, 4, 6), 1, 0.3, seed)
     room, margin = (24, 24, 48), np.array([7, 7, 14])  # so that nothing reaches the border
     zyx = np.stack(np.unravel_index(scene.index, scene.shape))
@@ -133,7 +133,7 @@ def test_a_translated_scene_gives_the_translated_answer(size, shift, seed):
 
 
 @given(st.permutations(range(4)), st.integers(0, 99))
-def test_each_grid_of_a_batch_is_answered_by_itself(order, seed):
+def test_the_grids_of_a_batch_are_independent(order, seed):
     rng = np.random.default_rng(seed)
     shape = (4, 5, 3)
     indices = [np.flatnonzero(rng.random(60) < share) for share in (0.0, 0.1, 0.5, 0.9)]
@@ -159,7 +159,7 @@ def test_it_is_linear_in_the_kernel(factor, seed):
     )
 
 
-def test_the_dense_form_has_each_value_in_its_place():
+def test_the_dense_volume_has_each_value_at_its_position():
     made = Occupancy.of_grids([np.array([0, 5]), np.array([23])], [[0.5, 1.0], [0.25]], (2, 3, 4))
     dense = made.dense()
     assert len(made) == 2
@@ -175,7 +175,7 @@ def test_positions_out_of_order_or_outside_the_grid_are_refused(index):
         Occupancy.of_grids([np.array([0]), np.array(index)], None, (2, 3, 4))
 
 
-def test_the_answer_does_not_depend_on_the_number_of_cores():
+def test_the_response_does_not_depend_on_the_number_of_cores():
     occupancy = grids((64, 64, 64), 2, 0.01, seed=0, valued=False)
     answers, gradients = [], []
     before = numba.get_num_threads()

@@ -25,7 +25,7 @@ def of_volume(occupancy: Occupancy, answers: np.ndarray, radius: float, above: f
 @pytest.mark.parametrize(
     ("length", "voxel_size", "n"), [(6.0, 1.0, 6), (0.9, 1.0, 0), (0.6, 0.2, 3), (2.1, 0.7, 3)]
 )
-def test_lengths_are_cut_to_whole_voxels(length, voxel_size, n):
+def test_lengths_are_rounded_down_to_whole_voxels(length, voxel_size, n):
     assert whole_voxels(length, voxel_size) == n
 
 
@@ -59,7 +59,7 @@ def test_it_is_the_maximum_over_the_occupied_voxels_of_the_section(seed, radius,
 
 
 @given(st.integers(0, 500))
-def test_it_brings_no_answers_further_apart(seed):
+def test_it_does_not_increase_differences(seed):
     rng = np.random.default_rng(seed)
     occupancy = occupied(rng.random(SHAPE) < 0.3)
     one, other = rng.normal(size=(2, len(occupancy.index)))
@@ -67,7 +67,7 @@ def test_it_brings_no_answers_further_apart(seed):
     assert np.abs(after[0] - after[1]).max() <= np.abs(one - other).max() + 1e-12
 
 
-def test_nothing_occupied_has_no_section():
+def test_an_empty_grid_has_no_cross_sections():
     empty = occupied(np.zeros(SHAPE, bool))
     starts, rows = neighbours(empty, section_offsets(2.0, 1.0, 1.0))
     assert starts.tolist() == [0]

@@ -48,11 +48,11 @@ def test_probabilities_and_their_gradient(shape, size, bias, share, valued, seed
     occupancy, _ = scene(shape, seed, share, valued)
     kernel, offset = numbers(size, bias, seed)
     weight = torch.from_numpy(np.random.default_rng(seed).normal(size=(2, *shape)))
-    ours, theirs = observe(occupancy, kernel, offset), dense(occupancy, kernel, offset)
-    torch.testing.assert_close(ours, theirs, rtol=0, atol=1e-12)
+    ours, expected = observe(occupancy, kernel, offset), dense(occupancy, kernel, offset)
+    torch.testing.assert_close(ours, expected, rtol=0, atol=1e-12)
     for a, b in zip(
         gradients((ours * weight).sum(), kernel, offset),
-        gradients((theirs * weight).sum(), kernel, offset),
+        gradients((expected * weight).sum(), kernel, offset),
         strict=True,
     ):
         torch.testing.assert_close(a, b, rtol=0, atol=1e-10)
@@ -63,10 +63,10 @@ def test_the_error_and_its_gradient(shape, size, bias, share, valued, seed):
     occupancy, tower = scene(shape, seed, share, valued)
     kernel, offset = numbers(size, bias, seed)
     ours = squared_error(occupancy, kernel, offset, tower, WEIGHTS)
-    theirs = squared_error_dense(dense(occupancy, kernel, offset), tower, WEIGHTS)
-    torch.testing.assert_close(ours, theirs, rtol=1e-10, atol=1e-10)
+    expected = squared_error_dense(dense(occupancy, kernel, offset), tower, WEIGHTS)
+    torch.testing.assert_close(ours, expected, rtol=1e-10, atol=1e-10)
     for a, b in zip(
-        gradients(ours, kernel, offset), gradients(theirs, kernel, offset), strict=True
+        gradients(ours, kernel, offset), gradients(expected, kernel, offset), strict=True
     ):
         torch.testing.assert_close(a, b, rtol=1e-9, atol=1e-9)
 
@@ -91,7 +91,7 @@ def test_gradcheck_of_the_error(bias):
     )
 
 
-def test_what_is_not_a_number_makes_an_error_that_is_none():
+def test_nan_in_the_kernel_gives_a_nan_error():
     occupancy, tower = scene((4, 5, 6), 3, 0.3, valued=False)
     kernel = torch.full((3, 3, 3), float("nan"))
     assert torch.isnan(squared_error(occupancy, kernel, None, tower, WEIGHTS))
@@ -114,7 +114,7 @@ def test_counts_at_every_threshold(shape, size, bias, share, scale, seed):
     np.testing.assert_array_equal(counted.false, expected.false)
 
 
-def test_a_single_precision_probability_is_as_near_as_its_type_allows():
+def test_the_error_of_a_single_precision_probability_is_rounding():
     answers = np.concatenate([np.linspace(0, 12, 50_001), np.logspace(-30, 1, 5_001), [-1.0, -50]])
     # One voxel at a time: a kernel of one element makes the answer whatever it holds.
     indices = [np.arange(len(answers))]

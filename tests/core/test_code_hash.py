@@ -94,7 +94,7 @@ def double(x):
         ("layout", "Scale.factor * x", "(\n        Scale.factor\n        * x\n    )"),
     ],
 )
-def test_an_edit_that_computes_the_same_keeps_the_hash(package, what, old, new):
+def test_an_edit_without_effect_keeps_the_hash(package, what, old, new):
     package.write("numbers.py", SOURCE)
     script = package.script("from PACKAGE.numbers import double")
     before = package.hash(script)
@@ -106,7 +106,7 @@ def test_an_edit_that_computes_the_same_keeps_the_hash(package, what, old, new):
 @pytest.mark.parametrize(
     ("old", "new"), [("2.0", "2.5"), ("LIMIT = 3", "LIMIT = 4"), ("* x", "+ x")]
 )
-def test_an_edit_that_computes_something_else_changes_the_hash(package, old, new):
+def test_an_edit_with_an_effect_changes_the_hash(package, old, new):
     package.write("numbers.py", SOURCE)
     script = package.script("from PACKAGE.numbers import double")
     before = package.hash(script)
@@ -240,7 +240,7 @@ def test_circular_imports_are_handled(package):
     assert package.used(package.script("import PACKAGE.a")) == {"a", "b"}
 
 
-def test_a_script_that_is_not_python_is_an_error_that_says_where(package):
+def test_an_invalid_script_gives_an_error_with_its_place(package):
     script = package.script("x = = 1")
     with pytest.raises(InputError, match=r"stage\.py: line 1: the file is not valid Python"):
         package.hash(script)

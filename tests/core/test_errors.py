@@ -26,7 +26,7 @@ def test_the_message_has_the_parts_that_are_known(parts, message):
     assert str(InputError("it is empty", **parts)) == message
 
 
-def test_an_error_survives_the_way_from_one_process_to_another():
+def test_an_error_can_be_sent_between_processes():
     error = InputError("it is empty", file="a.laz", place="row 3", remedy="Fill it")
     copy = pickle.loads(pickle.dumps(error))
     assert str(copy) == str(error)

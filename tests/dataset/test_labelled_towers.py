@@ -40,7 +40,7 @@ def test_without_tower_points_there_are_no_towers():
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.6])
-def test_a_box_has_the_measures_it_was_made_with(turn):
+def test_a_box_has_the_properties_it_was_generated_with(turn):
     tower = find_towers(box(7.0, -3.0, turn=turn), SETTINGS).towers.iloc[0]
     assert tower["height"] == pytest.approx(20.0)
     assert tower["base"] == pytest.approx(100.0)
@@ -79,7 +79,7 @@ def test_a_few_stray_points_are_not_a_tower():
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_thinned_clusters_are_those_of_all_points(seed):
+def test_clusters_of_thinned_points_are_those_of_all_points(seed):
     rng = np.random.default_rng(seed)
     places = rng.uniform(0, 150, (6, 2))
     parts = [box(*p, n=int(rng.integers(200, 1500)), seed=seed) for p in places]

@@ -172,7 +172,7 @@ def test_fewer_crops_than_parts_are_refused_with_a_remedy(tmp_path, n):
         split_crops([path], SplitSettings())
 
 
-def test_no_survey_at_all_is_refused():
+def test_an_empty_list_of_surveys_is_refused():
     with pytest.raises(InputError, match="0 crops"):
         split_crops([], SplitSettings())
 

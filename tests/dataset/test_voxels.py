@@ -75,12 +75,12 @@ def test_a_stray_point_that_makes_the_grid_too_large_is_refused():
 
 
 @pytest.mark.parametrize("settings", [VoxelSettings(), VoxelSettings(fit="metric")])
-def test_no_points_have_no_grid(settings):
+def test_a_grid_without_points_is_refused(settings):
     with pytest.raises(InputError, match="no points"):
         settings.grid(np.empty((0, 3)))
 
 
-def test_a_voxel_is_a_tower_where_any_of_its_points_is():
+def test_a_voxel_is_tower_if_any_of_its_points_is():
     points = [[0.1, 0, 0]] * 99 + [[0.2, 0, 0], [1.5, 0, 0]]
     codes = [2] * 99 + [15, 16]  # one tower point among ground; a conductor is not a tower
     sample = voxelise(cloud(points, codes), VoxelGrid((0.0, 0.0, 0.0), 1.0, (1, 1, 3)))
@@ -126,7 +126,7 @@ def test_every_point_lies_in_its_voxel_and_is_counted_once(xyz, voxel_size):
     assert off.max() <= voxel_size / 2 + 1e-6
 
 
-def test_the_cache_gives_back_what_was_voxelised(tmp_path, scene):
+def test_the_cache_returns_what_was_voxelised(tmp_path, scene):
     samples = tmp_path / "samples"
     samples.mkdir()
     clouds = [scene(seed=seed) for seed in range(2)]
@@ -164,7 +164,7 @@ PUBLISHED = {  # occupied and tower voxels of the published code at 64^3
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_real_crops_have_the_voxels_that_the_published_code_finds(real_samples, name):
+def test_real_crops_have_the_voxels_of_the_published_code(real_samples, name):
     sample = real_samples[name]
     occupied, tower = PUBLISHED[name]
     assert abs(len(sample.index) - occupied) <= 3

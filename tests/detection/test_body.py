@@ -38,7 +38,7 @@ def test_one_return_from_below_the_ground_does_not_lower_the_foot(lattice):
     assert body.base == pytest.approx(lattice.place[2])
 
 
-def test_on_a_slope_the_foot_is_at_the_foot(lattice):
+def test_on_a_slope_the_foot_is_at_the_axis(lattice):
     slope = lattice.ground(slope=1.0)
     body = stand(lattice, lattice.together(slope, lattice.column(0, 0, 0, 16)))
     assert body.base == pytest.approx(lattice.place[2], abs=5.0)  # and not 30 m down the hill
@@ -59,7 +59,7 @@ def test_a_stray_return_high_above_is_not_its_top(lattice):
     assert stand(lattice, around, seen=(5.5, 9.5, 14.5, 70.5)).height == pytest.approx(16)
 
 
-def test_wires_above_one_another_do_not_stand(lattice):
+def test_conductors_above_one_another_have_no_body(lattice):
     wires = [lattice.column(0, 0, z, z + 1) for z in (18, 24, 30)]
     body = stand(lattice, lattice.together(lattice.ground(), *wires), seen=(18.5, 30.5))
     assert body.upright < 0.2
@@ -71,7 +71,7 @@ def test_the_legs_of_a_lattice_tower_count(lattice):
     assert body.upright > 0.9
 
 
-def test_the_middle_of_a_lattice_tower_is_found_from_its_legs(lattice):
+def test_the_centre_of_a_lattice_tower_is_found_from_its_legs(lattice):
     around = lattice.together(lattice.ground(), lattice_tower(lattice, 40.0, 4.0))
     leg = np.array([3.0, 3.0]) + lattice.place[:2]
     body = stand(lattice, around, seen=(10.5, 38.5))
@@ -81,7 +81,7 @@ def test_the_middle_of_a_lattice_tower_is_found_from_its_legs(lattice):
     assert free > 0.5
 
 
-def test_wires_and_crossarms_do_not_widen_a_body(lattice):
+def test_conductors_and_crossarms_do_not_widen_a_body(lattice):
     pole = lattice.column(0, 0, 0, 16)
     wires = [lattice.wires(b, 13.0) for b in (70, 250)]
     around = lattice.together(lattice.ground(), pole, *wires)
@@ -91,7 +91,7 @@ def test_wires_and_crossarms_do_not_widen_a_body(lattice):
     assert 0.8 < free < 1  # not where the wires are
 
 
-def test_what_nowhere_stands_free_has_no_width(lattice):
+def test_a_body_that_is_touched_everywhere_has_no_width(lattice):
     x, y, z = (side.ravel() for side in np.meshgrid(*[np.arange(-9, 10)] * 2, np.arange(0, 16)))
     block = lattice.voxels(np.column_stack([x, y, z]))
     at = AXIS + lattice.place[:2]

@@ -39,11 +39,11 @@ def upper(body, by=5):
     return body[np.argsort(body[:, 2])][by:]
 
 
-def test_nothing_detected_no_tower(lattice):
+def test_without_detected_voxels_there_is_no_tower(lattice):
     assert detect(np.empty((0, 3)), lattice.ground()) == []
 
 
-def test_a_pole_with_wires_is_a_tower_and_all_is_measured(lattice, pole):
+def test_a_pole_with_conductors_is_a_tower_with_all_measurements(lattice, pole):
     around, body = pole(3, -2)
     [tower] = detect(upper(body), lattice.together(lattice.ground(), around))
     x, y, _ = lattice.place
@@ -58,7 +58,7 @@ def test_a_pole_with_wires_is_a_tower_and_all_is_measured(lattice, pole):
 
 
 @pytest.mark.parametrize("bearings", [(), (80,), (80, 260), (80, 200)])
-def test_wires_make_the_tower(lattice, pole, bearings):
+def test_a_pole_is_a_tower_only_with_conductors(lattice, pole, bearings):
     around, body = pole(bearings=bearings)
     found = detect(upper(body), lattice.together(lattice.ground(), around))
     assert [len(t.spans) for t in found] == ([len(bearings)] if bearings else [])
@@ -72,14 +72,14 @@ def test_a_pole_at_the_edge_of_the_data_is_a_tower(lattice, pole):
     assert len(detect(upper(body), everything[everything[:, 0] >= lattice.place[0] - 2])) == 1
 
 
-def test_a_tower_without_ground_or_much_of_its_wires_is_a_tower(lattice, pole):
+def test_a_tower_without_ground_or_most_of_its_conductors_is_found(lattice, pole):
     around, body = pole(height=30)
     near = np.hypot(*(around - lattice.place)[:, :2].T) < 15
     [tower] = detect(upper(body), around[near])
     assert tower.height == pytest.approx(30, abs=3)
 
 
-def test_a_tree_detected_from_foot_to_top_is_none(lattice):
+def test_a_tree_detected_from_foot_to_top_is_not_a_tower(lattice):
     tree = lattice.tree(0, 0, 18)
     trunk = lattice.column(0, 0, 3, 18)
     wood = [lattice.tree(x, y, 17, seed=x + y + 30) for x in (-9, 0, 9) for y in (-9, 9)]
@@ -87,7 +87,7 @@ def test_a_tree_detected_from_foot_to_top_is_none(lattice):
     assert detect(trunk, lattice.together(lattice.ground(), tree, *wood)) == []
 
 
-def test_wires_above_one_another_without_a_tower_are_none(lattice):
+def test_conductors_above_one_another_are_not_a_tower(lattice):
     levels = [lattice.wires(b, z, beside=(0.0,)) for b in (80, 260) for z in (18, 24, 30)]
     above = np.concatenate([lattice.column(0, 0, z, z + 1) for z in (17, 18, 23, 24, 29, 30)])
     around = lattice.together(lattice.ground(), above, *levels)
@@ -95,14 +95,14 @@ def test_wires_above_one_another_without_a_tower_are_none(lattice):
     assert len(detect(above, around, min_upright=0.0)) == 1
 
 
-def test_a_wall_under_wires_is_none(lattice):
+def test_a_wall_under_conductors_is_not_a_tower(lattice):
     x, y, z = (v.ravel() for v in np.meshgrid(np.arange(-9, 10), np.arange(-9, 10), np.arange(15)))
     block = lattice.voxels(np.column_stack([x, y, z]))
     line = [lattice.wires(b, 15) for b in (80, 260)]
     assert detect(upper(lattice.column(0, 0, 0, 15)), lattice.together(block, *line)) == []
 
 
-def test_a_low_post_is_none(lattice, pole):
+def test_a_low_post_is_not_a_tower(lattice, pole):
     around, body = pole(height=8)
     everything = lattice.together(lattice.ground(), around)
     assert detect(upper(body, 3), everything) == []
@@ -117,7 +117,7 @@ def test_a_few_detected_voxels_are_enough_and_two_are_not(lattice, pole):
     assert len(detect(upper(body, 13), everything, min_voxels=2, min_body=2.0)) == 1
 
 
-def test_what_is_detected_at_one_height_is_none(lattice, pole):
+def test_voxels_detected_at_one_height_are_not_a_tower(lattice, pole):
     around, _ = pole()
     head = lattice.voxels(np.array([[x, 0, 14.0] for x in range(-3, 4)]))
     assert detect(head, lattice.together(lattice.ground(), around, head)) == []
@@ -132,7 +132,7 @@ def test_detected_ends_of_a_crossarm_are_the_same_tower(lattice, pole):
     assert len(tower.voxels) == 20 + len(arm)
 
 
-def test_towers_along_a_line_are_as_many_as_they_are(lattice, pole):
+def test_each_tower_of_a_line_is_detected_once(lattice, pole):
     parts = [pole(x, 0) for x in (-60, 0, 60)]
     around = lattice.together(lattice.ground(90), *(a for a, _ in parts))
     detected = np.concatenate([upper(b) for _, b in parts])
@@ -152,14 +152,14 @@ def test_a_tree_beside_a_tower_does_not_hide_it(lattice, pole):
 
 
 @pytest.mark.parametrize(("bearings", "n"), [((80,), 0), ((80, 260), 1)])
-def test_where_tau_is_not_reached_wires_leave_towards_two_sides(lattice, pole, bearings, n):
+def test_below_tau_conductors_must_leave_in_two_directions(lattice, pole, bearings, n):
     around, body = pole(bearings=bearings)
     everything = lattice.together(lattice.ground(), around)
     assert len(detect(upper(body), everything, probability=0.4)) == n
     assert len(detect(upper(body), everything, probability=0.6)) == 1
 
 
-def test_a_tree_under_a_line_is_none_where_tau_is_not_reached(lattice):
+def test_below_tau_a_tree_under_a_line_is_not_a_tower(lattice):
     x, y, z = (v.ravel() for v in np.meshgrid(np.arange(-6, 7), np.arange(-6, 7), np.arange(6, 15)))
     crown = lattice.voxels(np.column_stack([x, y, z])[np.hypot(x, y) < 6])
     line = [lattice.wires(b, 17.0) for b in (80, 260)]
@@ -169,7 +169,7 @@ def test_a_tree_under_a_line_is_none_where_tau_is_not_reached(lattice):
     assert len(detect(upper(trunk), around, probability=0.4, min_free=0.1)) == 1
 
 
-def test_half_of_the_answer_at_tau_is_looked_at():
+def test_voxels_from_half_the_response_at_tau_are_candidates():
     settings = DetectionSettings()
     assert np.arctanh(settings.threshold(0.99)) == pytest.approx(np.arctanh(0.99) / 2)
     assert settings.threshold(0.0) == 0.0
@@ -193,7 +193,7 @@ def test_order_of_voxels_does_not_matter(lattice, pole, order):
 
 @settings(max_examples=10)
 @given(st.floats(-3e5, 3e5), st.floats(-3e5, 3e5))
-def test_where_a_tower_stands_does_not_matter(lattice, pole, east, north):
+def test_the_position_of_a_tower_does_not_matter(lattice, pole, east, north):
     around, body = pole()
     move = np.round([east, north, 0])
     [here] = detect(upper(body), lattice.together(lattice.ground(), around))
@@ -202,7 +202,7 @@ def test_where_a_tower_stands_does_not_matter(lattice, pole, east, north):
     assert there.height == pytest.approx(here.height)
 
 
-def test_all_of_a_body_is_the_tower_from_above_its_foot_to_its_top(lattice, pole):
+def test_a_body_belongs_to_the_tower_from_above_its_foot_to_its_top(lattice, pole):
     around, body = pole()
     beside = lattice.column(1, 0, 3, 6)
     apart = lattice.column(4, 0, 0, 8)
@@ -233,7 +233,7 @@ def test_the_body_of_a_wide_tower_reaches_further(lattice, pole, width, reach):
     assert mine[x < reach - 0.01].all()
 
 
-def test_of_two_axes_of_a_tower_the_one_that_stands_free_is_its_own(lattice, pole):
+def test_of_two_axes_of_a_tower_the_free_standing_one_is_kept(lattice, pole):
     """A taller one that everything touches was found from afar, through a neighbouring tree."""
     from scenenet.detection import detect as detection
 

@@ -17,14 +17,14 @@ def field(keep) -> np.ndarray:
     return np.column_stack([x.ravel(), y.ravel()])[keep(x, y).ravel()] + PLACE
 
 
-def test_amid_the_data_the_edge_is_as_far_as_one_looks():
+def test_inside_the_data_the_distance_is_the_largest():
     assert edge_distance(PLACE, field(lambda x, y: np.ones_like(x, bool))) == MAX_M
 
 
 @pytest.mark.parametrize("away", [4.0, 11.0, 25.0, 44.0])
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("side", [-1, 1])
-def test_a_straight_edge_is_as_far_as_it_is(away, axis, side):
+def test_the_distance_from_a_straight_edge_is_measured(away, axis, side):
     ground = field(lambda x, y: side * (x, y)[axis] < away)
     assert edge_distance(PLACE, ground) == pytest.approx(away, abs=CELL_M / 2)
 
@@ -48,6 +48,6 @@ def test_an_edge_beyond_reach_does_not_count():
     assert edge_distance(PLACE, field(lambda x, y: x < 70)) == MAX_M
 
 
-def test_outside_the_data_there_is_no_distance_to_speak_of():
+def test_outside_the_data_the_distance_is_zero():
     assert edge_distance(PLACE, field(lambda x, y: x > 20)) == 0
     assert edge_distance(PLACE, np.empty((0, 2))) == 0

@@ -35,7 +35,7 @@ def _commands(text: str) -> Iterator[str]:
         yield from block.splitlines()
 
 
-def test_the_kernel_of_the_guide_can_be_added_as_it_stands_there(project_root, monkeypatch):
+def test_the_kernel_of_the_guide_can_be_added_unchanged(project_root, monkeypatch):
     registry.kernel_names()  # those there are stay known when the copy is dropped again
     monkeypatch.setattr(registry, "_KERNELS", dict(registry._KERNELS))
     text = (project_root / "docs" / "guides" / "kernels.md").read_text()

@@ -90,7 +90,7 @@ def test_a_perfect_model_scores_one():
     assert result.voxel.tau == 0.5
 
 
-def test_counts_of_all_crops_make_the_scores():
+def test_scores_follow_from_the_counts_of_all_crops():
     # crop 1: 12 of 12 tower voxels; crop 2: 12 false ones, 12 missed
     result = scores(Mock(pole(5), pole(25)), crop(1, 5), crop(2, 15))
     assert result.voxel.precision == 0.5
@@ -102,7 +102,7 @@ def test_counts_of_all_crops_make_the_scores():
     assert [s.f05 for s in result.per_sample] == [1.0, 0.0]
 
 
-def test_a_model_that_says_nothing_scores_as_the_trivial_one():
+def test_a_model_without_detections_scores_like_the_trivial_one():
     result = scores(Mock({}), crop(1, 5))
     assert result.voxel == result.voxel_trivial
     assert result.voxel.miou == pytest.approx(0.5, abs=0.01)
@@ -112,7 +112,7 @@ def test_a_model_that_says_nothing_scores_as_the_trivial_one():
     assert result.per_sample[0].position_error_m is None
 
 
-def test_empty_voxels_count_but_not_among_the_occupied():
+def test_empty_voxels_count_except_in_the_occupied_scores():
     ghost = {(z, 2, 20): 1.0 for z in range(4)}  # where there is no point
     result = scores(Mock(pole(5) | ghost), crop(1, 5))
     assert result.voxel.precision == 12 / 16
@@ -125,7 +125,7 @@ def test_a_voxel_at_tau_is_detected():
     assert scores(Mock(pole(5, 0.299)), crop(1, 5), tau=0.3).voxel.recall == 0.0
 
 
-def test_a_detected_pole_out_of_reach_of_every_true_one_is_a_false_tower():
+def test_a_detected_tower_far_from_every_labelled_one_is_false():
     result = scores(Mock(pole(5) | pole(15)), crop(1, 5, 25))
     assert result.to_json()["towers"] == {
         "precision": 0.5, "recall": 0.5, "median_error_m": 0.0, "n_true": 2, "n_predicted": 2,
@@ -152,13 +152,13 @@ def test_scores_are_plain_numbers():
     assert Evaluation.from_json(result.to_json()) == result
 
 
-def test_without_tau_there_is_no_score():
+def test_a_model_without_tau_cannot_be_scored():
     untuned = CARD.model_copy(update={"tau": None})
     with pytest.raises(InputError, match="no detection threshold"):
         score(Mock(), untuned, Dataset([], [], "edp", []), LONE_POLES)
 
 
-def test_only_the_part_asked_for_is_scored(chain, pole_finder, tmp_path):
+def test_only_the_selected_part_is_scored(chain, pole_finder, tmp_path):
     write_model(tmp_path / "m.json", *pole_finder)
     found = {
         part: evaluate(tmp_path / "m.json", [chain.voxels], chain.split, LONE_POLES, part)
@@ -173,7 +173,7 @@ def test_only_the_part_asked_for_is_scored(chain, pole_finder, tmp_path):
     assert towers.median_error_m < 1.0
 
 
-def test_a_tower_that_is_found_counts_whole_and_what_is_none_does_not():
+def test_detected_towers_count_whole_and_other_voxels_do_not():
     """Half of a pole and a low stump reach tau; of the towers, the pole is all that is one."""
     half = pole(5, low=6) | pole(20, low=0, high=2)
     samples, crops = zip(crop(1, 5), strict=True)
@@ -219,7 +219,7 @@ def test_towers_are_found_in_voxels_finer_than_the_points_are_dense():
 
 
 @pytest.mark.parametrize("whole", [True, False])
-def test_a_model_in_metres_says_whole_towers_unless_it_is_told_not_to(whole):
+def test_a_model_in_metres_predicts_whole_towers_by_default(whole):
     settings = ModelSettings(
         name="m", kind="scenenet", protocol="operational", metric=MetricSettings(whole_towers=whole)
     )

@@ -29,7 +29,7 @@ def shell(squared_distance: float, squared_radius: float, sigma: float) -> float
     return math.exp(-((squared_distance - squared_radius) ** 2) / (2 * sigma**2))
 
 
-def test_the_thesis_kernels_are_known():
+def test_the_kernels_of_the_thesis_are_registered():
     assert {"cylinder", "arrow", "negative_sphere"} <= set(kernel_names())
 
 
@@ -43,7 +43,7 @@ def test_the_shell_is_one_on_its_radius_and_falls_off_on_both_sides():
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_the_lattice_is_centred_on_the_element_that_answers(size):
+def test_the_lattice_is_centred_on_the_anchor(size):
     lattice = Lattice.of_size(size)
     kz, ky, kx = size
     centre = (kz - 1) // 2, (ky - 1) // 2, (kx - 1) // 2
@@ -54,7 +54,7 @@ def test_the_lattice_is_centred_on_the_element_that_answers(size):
 
 
 @pytest.mark.parametrize("size", [(9, 9), (9, 0, 9), (9, 9, -1)])
-def test_a_size_that_is_none_is_refused(size):
+def test_an_invalid_size_is_refused(size):
     with pytest.raises(ValueError, match="three positive integers"):
         Lattice.of_size(size)
 
@@ -82,7 +82,7 @@ def test_each_slice_of_cylinder_and_arrow_sums_to_zero(name, shape, size):
     assert kernel.sum(dim=(1, 2)).abs().max() < 1e-12
 
 
-def test_zero_sum_takes_the_mean_off_each_slice():
+def test_zero_sum_subtracts_the_mean_of_each_slice():
     kernel = torch.tensor([[[1.0, 3.0]], [[5.0, 5.0]]])
     assert zero_sum(kernel).tolist() == [[[-1.0, 1.0]], [[0.0, 0.0]]]
 
@@ -149,7 +149,7 @@ def test_a_turned_or_mirrored_kernel_is_the_kernel(name, shape):
     torch.testing.assert_close(kernel.flip(2), kernel)
 
 
-def test_arrow_knows_up_from_down():
+def test_the_arrow_is_not_symmetric_about_its_middle():
     kernel = sample("arrow", ARROW)
     assert not torch.allclose(kernel.flip(0), kernel, atol=0.1)
 
@@ -175,7 +175,7 @@ def test_kernels_are_differentiable_in_every_parameter(name, shape, size):
 
 
 @pytest.mark.parametrize("name", ["cylinder", "arrow", "negative_sphere"])
-def test_parameters_say_range_unit_and_meaning(name):
+def test_parameters_have_range_unit_and_meaning(name):
     for parameter in kernel_named(name).parameters:
         assert 0 < parameter.low < parameter.high  # the thesis wants them non-negative
         assert parameter.unit in {"voxel", "voxel^2", "1"}
@@ -184,7 +184,7 @@ def test_parameters_say_range_unit_and_meaning(name):
 
 @pytest.mark.parametrize("sigma", [0.0, -1e-10, 1e-20, 1e-7, -1e-4])
 @pytest.mark.parametrize("radius", [0.0, 1.0, 1.7])
-def test_a_shell_without_thickness_is_a_number_and_has_a_slope(sigma, radius):
+def test_a_shell_without_thickness_is_finite_and_has_zero_slope(sigma, radius):
     distance = torch.arange(0.0, 9.0) ** 2
     width = torch.tensor(sigma, requires_grad=True)
     r = torch.tensor(radius, requires_grad=True)

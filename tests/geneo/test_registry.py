@@ -57,7 +57,7 @@ def disc(own_registry, monkeypatch, tmp_path):
     registry._discover.cache_clear()
 
 
-def test_a_file_among_the_kernels_is_enough_to_train_store_and_read_it(disc, tmp_path):
+def test_one_new_file_adds_a_kernel_that_trains_and_is_stored(disc, tmp_path):
     assert "disc" in kernel_names()
     model = SceneNet(["cylinder", "disc"], (5, 5, 5))
     assert model.n_parameters() == 2 + 1 + 1
@@ -75,7 +75,7 @@ def test_a_file_among_the_kernels_is_enough_to_train_store_and_read_it(disc, tmp
     assert "radius of the disc" in (tmp_path / "model.json").read_text()
 
 
-def test_an_unknown_kernel_is_refused_with_those_there_are():
+def test_an_unknown_kernel_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match=r"unknown GENEO kernel 'disk'.*arrow, cylinder, negative"):
         kernel_named("disk")
 

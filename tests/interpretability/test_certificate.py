@@ -36,7 +36,7 @@ def field(card, tmp_path_factory):
     return certificate(path)
 
 
-def test_it_is_that_of_the_model_at_the_voxel_size_of_its_card(field, card, tmp_path):
+def test_the_certificate_is_measured_at_the_voxel_size_of_the_model(field, card, tmp_path):
     from scenenet.models.model_file import read_model
 
     path = tmp_path / "m.json"
@@ -48,7 +48,7 @@ def test_it_is_that_of_the_model_at_the_voxel_size_of_its_card(field, card, tmp_
     assert (found.model, found.seed, found.voxel_size) == ("m", 4, 1.5)
 
 
-def test_each_statement_has_the_number_that_goes_with_it(field):
+def test_each_statement_has_its_number(field):
     values = {s.property: s.value for s in field.statements}
     numbers = field.numbers
     assert len(values) == 8
@@ -61,7 +61,7 @@ def test_each_statement_has_the_number_that_goes_with_it(field):
     assert values["zero-sum kernels sum to zero"] < 1e-4
 
 
-def test_of_a_cnn_only_what_a_convolution_has_is_said(card, tmp_path):
+def test_a_cnn_only_has_the_statements_of_a_convolution(card, tmp_path):
     path = tmp_path / "m.safetensors"
     write_model(path, CNN(kernel_size=(5, 5, 5)), card)
     told = {s.property: s.holds for s in certificate(path).statements}
@@ -71,7 +71,7 @@ def test_of_a_cnn_only_what_a_convolution_has_is_said(card, tmp_path):
     }
 
 
-def test_it_is_plain_and_the_same_each_time(field, card, tmp_path):
+def test_it_is_reproducible_and_has_plain_values(field, card, tmp_path):
     read = ModelCertificate.from_json(json.loads(json.dumps(field.to_json(), allow_nan=False)))
     assert read.statements == field.statements and read.turns == field.turns
     assert read.half_voxel == field.half_voxel

@@ -39,7 +39,7 @@ def holds(certificate, about: str) -> bool:
 
 @pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("measurement", ["presence", "density"])
-def test_a_scenenet_moves_and_turns_by_quarters_with_the_scene(size, measurement):
+def test_a_scenenet_is_equivariant_under_translation_and_quarter_turns(size, measurement):
     found = certify(scenenet(size), measurement=measurement)
     assert found.translation_error < 1e-5
     assert found.quarter_turn_error < 1e-5
@@ -49,7 +49,7 @@ def test_a_scenenet_moves_and_turns_by_quarters_with_the_scene(size, measurement
 
 
 @pytest.mark.parametrize("size", [(9, 6, 6), (9, 5, 7)])
-def test_a_kernel_that_is_not_square_and_odd_does_not_turn(size):
+def test_a_kernel_that_is_not_square_and_odd_is_not_equivariant(size):
     found = certify(scenenet(size))
     assert found.translates
     assert found.kernel_turn_error == 1
@@ -57,7 +57,7 @@ def test_a_kernel_that_is_not_square_and_odd_does_not_turn(size):
     assert not holds(found, "quarter turns")
 
 
-def test_a_cnn_moves_with_the_scene_and_does_not_turn():
+def test_a_cnn_is_equivariant_under_translation_only():
     found = certify(cnn())
     assert found.translates
     assert not found.turns_by_quarters
@@ -67,7 +67,7 @@ def test_a_cnn_moves_with_the_scene_and_does_not_turn():
     assert found.turns[-1].mean_h > 0.1
 
 
-def test_no_other_turn_is_exact_and_a_shift_by_half_a_voxel_is_not_either():
+def test_other_rotations_and_half_voxel_shifts_are_not_exact():
     found = certify(scenenet(), tau=0.5)
     by_angle = {turn.degrees: turn for turn in found.turns}
     for exact in (0.0, 90.0):
@@ -82,14 +82,14 @@ def test_no_other_turn_is_exact_and_a_shift_by_half_a_voxel_is_not_either():
     assert not holds(found, "any rotation")
 
 
-def test_a_scenenet_turns_better_than_a_free_kernel():
+def test_a_scenenet_changes_less_under_rotation_than_a_free_kernel():
     def worst(model) -> float:
         return max(turn.mean_h for turn in certify(model, angles=(30.0, 45.0)).turns)
 
     assert worst(scenenet((5, 5, 5))) < worst(cnn())
 
 
-def test_finer_voxels_do_not_decide_what_the_angles_are():
+def test_the_measured_angles_do_not_depend_on_the_voxel_size():
     found = certify(scenenet(), voxel_size=0.5, angles=(33.0,))
     assert [turn.degrees for turn in found.turns] == [33.0]
 
@@ -123,7 +123,7 @@ def test_the_bound_is_reached_and_never_passed(size, seed):
     assert found.highest_h - found.lowest_h == pytest.approx(found.l1)
 
 
-def test_a_zero_sum_kernel_is_no_contraction_and_the_normalised_observer_is():
+def test_only_the_normalised_observer_is_non_expansive():
     weights = {"cylinder": 1.0, "arrow": 0.0, "negative_sphere": 0.0}
     model = scenenet(weights=weights)
     found = certify(model, tau=0.9)
@@ -136,7 +136,7 @@ def test_a_zero_sum_kernel_is_no_contraction_and_the_normalised_observer_is():
     assert found.normalised_tau == pytest.approx(math.atanh(0.9) / found.l1)
 
 
-def test_a_small_kernel_is_a_contraction():
+def test_a_small_kernel_is_non_expansive():
     class Quiet(CNN):
         def observer(self):
             kernel, bias = super().observer()
@@ -148,7 +148,7 @@ def test_a_small_kernel_is_a_contraction():
     assert holds(found, "observer H")
 
 
-def test_the_model_keeps_still_for_presence_alone():
+def test_the_model_is_non_expansive_for_presence_only():
     assert holds(certify(scenenet(), angles=()), "model M")
     assert not holds(certify(scenenet(), measurement="density", angles=()), "model M")
 
@@ -210,7 +210,7 @@ def test_cylinder_and_arrow_sum_to_zero_and_the_sphere_does_not():
     assert holds(found, "sum to zero")
 
 
-def test_a_model_without_geneos_has_nothing_to_mix():
+def test_a_model_without_geneos_has_no_mixing_weights():
     found = certify(cnn(), angles=())
     assert found.kernels == ()
     assert found.weight_sum is None
@@ -218,7 +218,7 @@ def test_a_model_without_geneos_has_nothing_to_mix():
     assert not [s for s in found.statements() if "convex" in s.property or "zero" in s.property]
 
 
-def test_the_certificate_is_plain_and_the_same_each_time():
+def test_certify_is_reproducible_and_has_plain_values():
     one, other = (certify(scenenet(), tau=0.7) for _ in range(2))
     assert one == other
     plain = json.loads(json.dumps(asdict(one), allow_nan=False))
@@ -229,7 +229,7 @@ def test_the_certificate_is_plain_and_the_same_each_time():
         assert "4." in statement.thesis or "3." in statement.thesis
 
 
-def test_a_model_that_answers_nothing_has_a_certificate():
+def test_a_model_without_response_has_a_certificate():
     class Dead(CNN):
         def observer(self):
             kernel, bias = super().observer()
@@ -242,7 +242,7 @@ def test_a_model_that_answers_nothing_has_a_certificate():
     json.dumps(asdict(found), allow_nan=False)
 
 
-def test_a_scene_in_map_coordinates_is_taken_about_its_own_middle():
+def test_a_scene_in_map_coordinates_is_centred():
     near = certify(scenenet(), sample_scene(), angles=(45.0,))
     far = certify(
         scenenet(), sample_scene() + np.array([500_000.0, 4_630_000.0, 100.0]), angles=(45.0,)
@@ -261,7 +261,7 @@ def test_every_turn_of_a_scene_stays_inside_its_grid():
         np.testing.assert_allclose(turned[:, 2], scene.xyz[:, 2])
 
 
-def test_scenes_that_cannot_be_measured_on_are_refused():
+def test_invalid_scenes_are_refused():
     with pytest.raises(InputError, match="no points"):
         certify(scenenet(), np.empty((0, 3)))
     with pytest.raises(InputError, match="voxels"):

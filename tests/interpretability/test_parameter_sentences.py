@@ -37,7 +37,7 @@ def lengths(sentence: str) -> list[float]:
     return [float(x) for x in re.findall(r"(\d+\.\d+) m\b", sentence)]
 
 
-def test_kernels_in_voxels_are_brought_to_metres_and_those_in_metres_stay():
+def test_parameters_in_voxels_are_converted_to_metres():
     in_voxels = {p.name: p for p in parameters_of(SceneNet(), 0.5)}
     assert in_voxels["cylinder.r"].factor == 0.5
     assert in_voxels["cylinder.sigma"].factor == 0.25
@@ -49,7 +49,7 @@ def test_kernels_in_voxels_are_brought_to_metres_and_those_in_metres_stay():
     assert [p.name for p in in_metres] == list(SceneNet().shape_parameters())
 
 
-def test_every_number_has_a_sentence_and_it_follows_the_number():
+def test_every_number_has_a_sentence_that_depends_on_it():
     first = sentences(SceneNet(), VALUES)
     assert list(first) == list(SceneNet().shape_parameters())
     other = sentences(SceneNet(), {name: 0.8 * value for name, value in VALUES.items()})
@@ -57,12 +57,12 @@ def test_every_number_has_a_sentence_and_it_follows_the_number():
 
 
 def test_the_cylinder_is_as_wide_as_twice_its_radius_and_a_share_of_a_tower():
-    said = sentences(SceneNet(), VALUES, Reference(tower_width=3.6))["cylinder.r"]
-    assert lengths(said) == [1.8]
-    assert "50% of the mean width" in said
+    texts = sentences(SceneNet(), VALUES, Reference(tower_width=3.6))["cylinder.r"]
+    assert lengths(texts) == [1.8]
+    assert "50% of the mean width" in texts
 
 
-def test_the_widths_that_sigma_is_read_as_are_where_the_shell_is_half_as_high():
+def test_the_widths_for_sigma_are_where_the_shell_is_half_as_high():
     inner, outer = lengths(sentences(SceneNet(), VALUES)["cylinder.sigma"])
     r, sigma = VALUES["cylinder.r"], VALUES["cylinder.sigma"]
     for d in (inner, outer):
@@ -70,7 +70,7 @@ def test_the_widths_that_sigma_is_read_as_are_where_the_shell_is_half_as_high():
         assert height == pytest.approx(0.5, abs=0.07)  # lengths are written with two digits
 
 
-def test_beyond_the_length_that_omega_is_read_as_the_sphere_takes_away():
+def test_the_sphere_is_negative_beyond_the_length_given_for_omega():
     (beyond,) = lengths(sentences(SceneNet(), VALUES)["negative_sphere.omega"])
     shape = {
         name: torch.tensor(VALUES[f"negative_sphere.{name}"]) for name in ("r", "sigma", "omega")
@@ -83,21 +83,21 @@ def test_beyond_the_length_that_omega_is_read_as_the_sphere_takes_away():
     assert float(kernel[30 + round(10 * beyond) - 2]) > 0
 
 
-def test_weights_say_who_has_the_most():
-    said = sentences(SceneNet(), VALUES)
-    assert said["lambda.negative_sphere"].startswith("70.0%")
-    assert "the largest weight of the 3" in said["lambda.negative_sphere"]
-    assert "the smallest weight" in said["lambda.arrow"]
+def test_sentences_of_weights_give_their_rank():
+    texts = sentences(SceneNet(), VALUES)
+    assert texts["lambda.negative_sphere"].startswith("70.0%")
+    assert "the largest weight of the 3" in texts["lambda.negative_sphere"]
+    assert "the smallest weight" in texts["lambda.arrow"]
 
 
-def test_a_negative_weight_and_a_sphere_without_omega_are_said_to_be_so():
+def test_a_negative_weight_and_a_sphere_without_omega_are_described():
     odd = VALUES | {"lambda.arrow": -0.2, "negative_sphere.omega": -0.1}
-    said = sentences(SceneNet(), odd)
-    assert "not convex" in said["lambda.arrow"]
-    assert "nothing is subtracted" in said["negative_sphere.omega"]
+    texts = sentences(SceneNet(), odd)
+    assert "not convex" in texts["lambda.arrow"]
+    assert "nothing is subtracted" in texts["negative_sphere.omega"]
 
 
-def test_repeated_kernels_are_read_by_their_own_numbers():
+def test_repeated_kernels_are_described_by_their_own_numbers():
     model = SceneNet(["cylinder", "cylinder"])
     values = {
         "cylinder.r": 0.5,
@@ -107,11 +107,11 @@ def test_repeated_kernels_are_read_by_their_own_numbers():
         "lambda.cylinder": 0.5,
         "lambda.cylinder_2": 0.5,
     }
-    said = sentences(model, values)
-    assert lengths(said["cylinder_2.r"]) == [4.0]
+    texts = sentences(model, values)
+    assert lengths(texts["cylinder_2.r"]) == [4.0]
 
 
-def test_names_of_tables_and_pictures_are_known_without_waiting_for_torch():
+def test_names_of_tables_and_pictures_need_no_torch():
     """The workflow asks for them whenever it is planned."""
     asked = "import sys, scenenet.results.tables, scenenet.figures, scenenet.results.folder"
     heavy = "print([name for name in ('torch', 'matplotlib', 'numba') if name in sys.modules])"

@@ -66,7 +66,7 @@ def test_a_voxel_is_a_tower_from_tau_on():
     assert confusion(probability, tower, 0.3) == Confusion(tp=2, fp=1, fn=1, tn=1)
 
 
-def test_voxels_not_given_are_background_that_was_seen_as_such():
+def test_voxels_that_are_not_given_count_as_true_negatives():
     probability, tower = np.array([0.9, 0.1]), np.array([True, True])
     assert confusion(probability, tower, 0.5, n_voxels=100) == Confusion(1, 0, 1, 98)
 
@@ -112,7 +112,7 @@ def test_tau_by_hand():
     assert counts.f05 == pytest.approx(0.9090909)
 
 
-def test_where_nothing_can_be_gained_tau_is_the_highest():
+def test_without_any_gain_tau_is_the_highest():
     tau, counts = ThresholdCurve.of(np.array([0.9, 0.0]), np.array([False, True])).best()
     assert tau == THRESHOLDS[-1]
     assert counts == Confusion(0, 0, 1, 1)
@@ -124,7 +124,7 @@ def test_thresholds_differ_in_float32_and_none_is_zero_or_one():
     assert single[0] > 0 and single[-1] < 1
 
 
-def test_a_prediction_that_is_no_number_is_no_tower():
+def test_a_nan_probability_is_not_a_tower():
     nothing = np.full(3, np.nan, np.float32)
     tower = np.array([True, False, False])
     assert ThresholdCurve.of(nothing, tower).confusion(0) == confusion(nothing, tower, 0.001)
@@ -169,7 +169,7 @@ def test_nearest_pairs_come_first():
 
 
 @pytest.mark.parametrize(("n_predicted", "n_true"), [(0, 0), (0, 2), (2, 0)])
-def test_without_pairs_there_is_no_error_to_speak_of(n_predicted, n_true):
+def test_without_matches_there_is_no_position_error(n_predicted, n_true):
     scores = match_towers(np.zeros((n_predicted, 2)), np.zeros((n_true, 2))).scores()
     assert scores == {
         "precision": 0.0,

@@ -57,7 +57,7 @@ def test_a_model_is_read_back_as_it_was_written(tmp_path, model):
     assert torch.equal(back.observer()[0], model.observer()[0])
 
 
-def test_a_person_can_read_what_a_scene_net_has_learnt(written):
+def test_the_file_of_a_scene_net_is_readable(written):
     model, path = written
     data = json.loads(path.read_text())
     assert data["format"] == "scenenet-model"
@@ -75,7 +75,7 @@ def test_a_person_can_read_what_a_scene_net_has_learnt(written):
     assert sum(data["mixing_weights"].values()) == pytest.approx(1)
 
 
-def test_a_number_changed_by_hand_is_taken(written):
+def test_a_number_edited_by_hand_is_read(written):
     _, path = written
     data = json.loads(path.read_text())
     data["geneos"][0]["parameters"]["r"]["value"] = 1.25
@@ -121,7 +121,7 @@ def _put(value, *keys):
         (_put("wide", "geneos", 0, "parameters", "r", "value"), "not a readable model file"),
     ],
 )
-def test_a_file_that_does_not_say_what_it_must_is_refused_by_name(written, change, message):
+def test_an_incomplete_model_file_is_refused_by_name(written, change, message):
     _, path = written
     data = json.loads(path.read_text())
     change(data)
@@ -141,7 +141,7 @@ def test_a_file_that_does_not_say_what_it_must_is_refused_by_name(written, chang
         ("m.safetensors", b"\x80\x04\x95pickled"),
     ],
 )
-def test_something_else_is_refused_by_name(tmp_path, name, content):
+def test_another_kind_of_file_is_refused_by_name(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=r"not a (readable )?model file") as refused:
         read_model(tmp_path / name)
@@ -156,7 +156,7 @@ def test_weights_without_a_card_are_refused(tmp_path):
         read_model(tmp_path / "m.safetensors")
 
 
-def test_a_file_that_is_not_there_is_refused(tmp_path):
+def test_a_missing_model_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="no such model file"):
         read_model(tmp_path / "m.json")
 

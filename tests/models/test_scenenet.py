@@ -93,7 +93,7 @@ def test_an_empty_scene_has_no_tower():
     assert answer(seeded(1), np.zeros(ROOM, bool)).max() == 0
 
 
-def test_the_probability_is_tanh_of_the_mixed_answers_cut_at_zero():
+def test_the_probability_is_tanh_and_relu_of_the_mixed_responses():
     model = seeded(3)
     scene = occupancy(volume(3))
     with torch.no_grad():
@@ -102,7 +102,7 @@ def test_the_probability_is_tanh_of_the_mixed_answers_cut_at_zero():
         torch.testing.assert_close(model(scene), expected, rtol=0, atol=EXACT)
 
 
-def test_the_contributions_are_the_mixing_weights_times_each_kernels_answer():
+def test_contributions_are_mixing_weight_times_response():
     model = seeded(4)
     scene = occupancy(volume(4))
     with torch.no_grad():
@@ -144,7 +144,7 @@ def test_a_crop_on_its_side_does_not_give_the_prediction_on_its_side():
     assert (on_its_side - expected).abs().max() > 0.1
 
 
-def test_an_untrained_cnn_does_not_turn_with_the_crop():
+def test_an_untrained_cnn_is_not_equivariant_under_rotation():
     model = CNN(generator=torch.Generator().manual_seed(0))
     scene = volume(3)
     turned = answer(model, np.rot90(scene, axes=(1, 2)))
@@ -181,12 +181,12 @@ def test_a_single_geneo_has_the_weight_one():
     assert model.mixing_weights().tolist() == [1.0]
 
 
-def test_no_geneo_is_no_scene_net():
+def test_a_scene_net_without_geneos_is_refused():
     with pytest.raises(InputError, match="at least one"):
         SceneNet([])
 
 
-def test_another_kernel_size_keeps_the_numbers():
+def test_another_kernel_size_keeps_the_parameters():
     model = seeded(5)
     taller = model.with_kernel_size((15, 5, 5))
     assert taller.shape_parameters() == model.shape_parameters()

@@ -67,7 +67,7 @@ def test_torch_is_pinned_without_a_build(constraints):
     assert constraints["torch"] == "2.13.0"
 
 
-def test_the_constraints_name_no_place_on_a_machine(project_root):
+def test_the_constraints_contain_no_machine_paths(project_root):
     text = (project_root / "constraints.txt").read_text()
     assert "file:" not in text and " @ " not in text
 

@@ -120,7 +120,7 @@ def test_the_package_is_typed_and_comes_from_the_wheel(installed: Installed):
     assert (folder / "py.typed").is_file()
 
 
-def test_it_states_its_version(installed: Installed, project_root: Path):
+def test_version_prints_the_version(installed: Installed, project_root: Path):
     project = tomllib.loads((project_root / "pyproject.toml").read_text())["project"]
     assert installed.scenenet("--version").stdout == f"scenenet {project['version']}\n"
 

@@ -32,7 +32,7 @@ def make_las(tmp_path: Path) -> MakeLas:
         header = laspy.LasHeader(version=version, point_format=point_format)
         header.scales, header.offsets = np.full(3, scale), np.array([544_000.0, 4_634_000.0, 100.0])
         for dimension, dtype in (extra or {}).items():
-            header.add_extra_dim(laspy.ExtraBytesParams(dimension, dtype, description="theirs"))
+            header.add_extra_dim(laspy.ExtraBytesParams(dimension, dtype, description="existing"))
         if crs is not None:
             header.add_crs(pyproj.CRS(crs))
         las = laspy.LasData(header)

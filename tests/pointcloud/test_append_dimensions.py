@@ -65,14 +65,14 @@ def test_every_point_format_keeps_every_dimension(make_las, tmp_path, point_form
     assert_same_for_laspy(source, target)
 
 
-def test_extra_dimensions_of_others_keep_names_types_and_values(make_las, tmp_path):
-    theirs = {"amplitude": "u2", "normal": "3f8", "height above ground": "f4"}
-    source, target = make_las("in.laz", extra=theirs), tmp_path / "out.laz"
+def test_existing_extra_dimensions_keep_names_types_and_values(make_las, tmp_path):
+    existing = {"amplitude": "u2", "normal": "3f8", "height above ground": "f4"}
+    source, target = make_las("in.laz", extra=existing), tmp_path / "out.laz"
     add_dimensions(source, target, NAMES, values)
     assert_same_for_laspy(source, target)
-    assert survey_info(target).extra_dimensions == (*theirs, *NAMES)
+    assert survey_info(target).extra_dimensions == (*existing, *NAMES)
     description = laspy.read(target).point_format.dimension_by_name("amplitude").description
-    assert description == "theirs"
+    assert description == "existing"
 
 
 def test_the_coordinate_system_and_the_scale_stay(make_las, tmp_path):
@@ -102,14 +102,14 @@ def test_dimensions_of_a_written_cloud_are_not_taken_for_predictions(tmp_path):
     np.testing.assert_array_equal(laspy.read(target).truth, np.arange(5))
 
 
-def test_a_name_that_someone_else_took_is_refused_and_nothing_written(make_las, tmp_path):
+def test_an_existing_dimension_with_a_reserved_name_is_refused(make_las, tmp_path):
     source = make_las("in.laz", extra={"tower_id": "u2"})
     with pytest.raises(InputError, match="tower_id"):
         add_dimensions(source, tmp_path / "out.laz", NAMES, values)
     assert not (tmp_path / "out.laz").exists()
 
 
-def test_extended_records_are_kept_and_their_place_is_told(make_las, tmp_path):
+def test_extended_records_are_kept(make_las, tmp_path):
     source = make_las("in.laz")
     with laspy.open(source) as reader:
         points, header = reader.read().points, reader.header
@@ -188,11 +188,11 @@ def test_waveform_packets_of_several_channels_are_not_compressed_to_nonsense(
     assert_same_but_for_additions(source, tmp_path / "out.las")
 
 
-def test_the_meaning_of_dimensions_of_others_is_kept_as_bytes(make_las, tmp_path, patched):
+def test_the_no_data_value_of_existing_dimensions_is_kept(make_las, tmp_path, patched):
     source = make_las("in.laz", extra={"amplitude": "u2"})
     at = source.read_bytes().index(b"amplitude") - 4  # where its description begins
-    told = {at + 3: b"\x01", at + 40: struct.pack("<Q", 65535)}  # the value for "no data"
-    source, target = patched(source, told), tmp_path / "out.laz"
+    changes = {at + 3: b"\x01", at + 40: struct.pack("<Q", 65535)}  # the value for "no data"
+    source, target = patched(source, changes), tmp_path / "out.laz"
     add_dimensions(source, target, NAMES, values)
     data = target.read_bytes()
     new = data.index(b"amplitude") - 4
@@ -200,7 +200,7 @@ def test_the_meaning_of_dimensions_of_others_is_kept_as_bytes(make_las, tmp_path
     assert data[new + 40 : new + 48] == struct.pack("<Q", 65535)
 
 
-def test_no_dimension_comes_with_bounds_that_are_not_its_own(make_las, tmp_path):
+def test_no_dimension_has_the_bounds_of_another(make_las, tmp_path):
     source, target = make_las("in.laz", extra={"amplitude": "u2", "normal": "3f8"}), "out.laz"
     add_dimensions(source, tmp_path / target, NAMES, values)
     las = laspy.read(tmp_path / target)

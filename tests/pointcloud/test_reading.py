@@ -60,7 +60,7 @@ def test_a_chunk_may_hold_several_compressed_pieces_and_cut_them(make_las):
     np.testing.assert_array_equal(read(path).xyz[:, 0], np.asarray(peer.x))
 
 
-def test_a_chunk_that_one_keeps_is_not_overwritten_by_the_next(make_las):
+def test_a_chunk_is_not_overwritten_by_the_next(make_las):
     chunks = iter_chunks(make_las("survey.laz", n=100), chunk_points=50)
     first = next(chunks)
     kept = first.xyz.copy()
@@ -93,7 +93,7 @@ def test_extra_dimensions_are_named_by_the_info(make_las):
 # --- what is not a survey ---------------------------------------------------------------------
 
 
-def test_a_missing_file_is_told_with_names_that_are_near(make_las):
+def test_a_missing_file_is_reported_with_similar_names(make_las):
     path = make_las("corridor_14.laz")
     with pytest.raises(InputError, match=r"corridor_14\.laz") as caught:
         read(path.with_name("coridor_14.laz"))
@@ -127,7 +127,7 @@ def test_a_folder_is_not_a_survey(tmp_path):
         read(tmp_path)
 
 
-def test_unknown_class_codes_are_refused_with_those_there_are(make_las):
+def test_an_unknown_class_scheme_is_refused_with_the_known_ones(make_las):
     with pytest.raises(InputError, match="edp, asprs"):
         iter_chunks(make_las(), "aspr")
 

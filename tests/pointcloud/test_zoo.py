@@ -63,9 +63,9 @@ def test_every_file_ends_in_its_points_or_an_error_that_names_it(name, real_data
             assert caught.value.remedy
     else:
         cloud, info, report = read(path, "asprs"), survey_info(path), check_survey(path, "asprs")
-        told = re.search(r"n=(\d+)", manifest[name]["laspy_2.7.0_lazrs"])
-        assert told is not None
-        assert len(cloud) == info.n_points == report.to_dict()["n_points"] == int(told[1])
+        listed = re.search(r"n=(\d+)", manifest[name]["laspy_2.7.0_lazrs"])
+        assert listed is not None
+        assert len(cloud) == info.n_points == report.to_dict()["n_points"] == int(listed[1])
         assert np.isfinite(cloud.xyz).all()
     assert time.perf_counter() - start < TIME_LIMIT_S
 
@@ -97,6 +97,6 @@ def test_where_laspy_reads_the_whole_file_the_points_are_the_same(name, real_dat
         ("libLAS__bad_points_1.1.las", "impossible return number"),
     ],
 )
-def test_what_is_odd_about_a_readable_file_is_told(name, words, real_data):
+def test_defects_of_a_readable_file_are_reported(name, words, real_data):
     warnings = check_survey(real_data / "zoo" / name, "asprs").warnings
     assert any(words in warning for warning in warnings), warnings

@@ -26,7 +26,7 @@ def everything(spool) -> np.ndarray:
 
 @pytest.mark.parametrize("radius", [0.0, 3.0, 28.0, 75.0, 1000.0])
 @pytest.mark.parametrize("away", [(0, 0), (-96, 96), (-149, 149), (170, 0), (900, -900)])
-def test_as_a_search_through_all(spool, everything, radius, away):
+def test_it_equals_a_search_through_all_voxels(spool, everything, radius, away):
     place = ORIGIN[:2] + away
     found = OccupiedVoxels(spool)(place, radius)
     apart = np.hypot(*(everything[:, :2] - place).T)

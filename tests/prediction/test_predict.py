@@ -107,12 +107,12 @@ def predicted(survey, model, tmp_path_factory) -> Prediction:
     return predict(survey, model, tmp_path_factory.mktemp("predicted"))
 
 
-def test_every_point_comes_back_with_all_it_had(survey, predicted):
+def test_every_point_keeps_all_its_values(survey, predicted):
     equal_field_by_field(laspy.read(survey), predicted.points)
     assert predicted.points.header.parse_crs() == laspy.read(survey).header.parse_crs()
 
 
-def test_the_answers_are_added_and_nothing_else(survey, predicted):
+def test_only_the_predictions_are_added(survey, predicted):
     before, after = laspy.read(survey).point_format, predicted.points.point_format
     added = set(after.dimension_names) - set(before.dimension_names)
     assert added == set(ADDED)
@@ -124,19 +124,19 @@ def test_the_tower_is_listed_where_it_stands(predicted):
     [tower] = predicted.towers["features"]
     assert tower["geometry"]["type"] == "Point"
     assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.5)
-    told = tower["properties"]
-    assert told["id"] == 1
-    assert told["height"] == pytest.approx(14.0, abs=1.0)
-    assert told["base_elevation"] == pytest.approx(100.0, abs=1.0)
-    assert 0.7 <= told["probability"] <= 1.0
-    assert told["edge_distance"] == pytest.approx(20.5, abs=2.0)
-    assert set(told["contributions"]) == {"cylinder", "arrow", "negative_sphere"}
-    assert sum(map(abs, told["contributions"].values())) == pytest.approx(1.0, abs=0.05)
+    properties = tower["properties"]
+    assert properties["id"] == 1
+    assert properties["height"] == pytest.approx(14.0, abs=1.0)
+    assert properties["base_elevation"] == pytest.approx(100.0, abs=1.0)
+    assert 0.7 <= properties["probability"] <= 1.0
+    assert properties["edge_distance"] == pytest.approx(20.5, abs=2.0)
+    assert set(properties["contributions"]) == {"cylinder", "arrow", "negative_sphere"}
+    assert sum(map(abs, properties["contributions"].values())) == pytest.approx(1.0, abs=0.05)
     crs = predicted.towers["crs"]["properties"]["name"]
     assert crs == "urn:ogc:def:crs:EPSG::32629"
 
 
-def test_wires_are_listed_with_their_tower_and_a_lone_pole_is_none(scene, model, tmp_path):
+def test_conductors_are_listed_and_a_lone_pole_is_not_a_tower(scene, model, tmp_path):
     cloud = scene([(20.5, 31.5), (60.5, 31.5)], size=(81.0, 60.0), tree=None)
     s = np.arange(-28, 28, 0.2)
     x, y = POLE
@@ -149,10 +149,10 @@ def test_wires_are_listed_with_their_tower_and_a_lone_pole_is_none(scene, model,
     found = predict(tmp_path / "line.laz", model, tmp_path / "out", DetectionSettings())
     [tower] = found.towers["features"]
     assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.6)
-    told = tower["properties"]
-    assert told["conductor_directions"] == 2
-    assert sorted(round(b) % 360 for b in told["conductor_bearings"]) == [0, 180]
-    assert 1.0 <= told["width"] <= 2.0
+    properties = tower["properties"]
+    assert properties["conductor_directions"] == 2
+    assert sorted(round(b) % 360 for b in properties["conductor_bearings"]) == [0, 180]
+    assert 1.0 <= properties["width"] <= 2.0
     assert set(np.unique(found.points["tower_id"])) == {0, 1}
 
 
@@ -170,7 +170,7 @@ def test_the_points_of_the_tower_carry_its_number(predicted):
     assert (points["tower_probability"][pole] < LONE_POLES.threshold(0.7)).any()
 
 
-def test_shares_sum_to_one_where_anything_answers(predicted):
+def test_shares_sum_to_one_where_there_is_a_response(predicted):
     points = predicted.points
     shares = np.stack([points[name] for name in SHARES])
     total = np.abs(shares).sum(axis=0)
@@ -182,7 +182,7 @@ def test_shares_sum_to_one_where_anything_answers(predicted):
     assert sure.any()
 
 
-def test_points_of_one_voxel_have_one_answer(predicted):
+def test_points_of_one_voxel_have_one_prediction(predicted):
     points = predicted.points
     voxels = np.floor(np.column_stack([points.x, points.y, points.z])).astype(int)
     _, voxel = np.unique(voxels, axis=0, return_inverse=True)
@@ -193,7 +193,7 @@ def test_points_of_one_voxel_have_one_answer(predicted):
         assert np.abs(spread).max() < 1e-6
 
 
-def test_the_summary_says_what_was_done(predicted, survey):
+def test_the_summary_describes_the_prediction(predicted, survey):
     summary = predicted.summary
     assert summary["survey"] == str(survey)
     assert summary["points"] == len(laspy.read(survey).points)
@@ -231,7 +231,7 @@ def test_the_voxel_size_can_be_set(survey, model, tmp_path):
     assert predict(survey, model, tmp_path, voxel_size=2.0).summary["voxel_size_m"] == 2.0
 
 
-def test_a_model_in_metres_sees_fine_voxels_in_blocks(survey, model, tmp_path):
+def test_a_model_in_metres_observes_fine_voxels_in_blocks(survey, model, tmp_path):
     _, card = read_model(model)
     settings = ModelSettings(name="metric", kind="scenenet", protocol="operational")
     write_model(tmp_path / "metric.json", new_model(settings, 0), card)
@@ -284,7 +284,7 @@ def test_a_sample_comes_back_as_laz(scene, model, tmp_path):
     assert (points["tower_id"] == 1).any()
 
 
-def test_a_stray_point_far_out_is_named_and_nothing_is_written(scene, model, tmp_path):
+def test_a_point_outside_the_lattice_is_named_and_nothing_is_written(scene, model, tmp_path):
     cloud = scene()
     xyz = np.concatenate([cloud.xyz, [[5e8, 0, 0]]])
     np.save(tmp_path / "stray.npy", np.column_stack([xyz, np.full(len(xyz), 2.0)]))
@@ -361,12 +361,12 @@ def test_a_real_survey_comes_back_field_by_field(real_prediction, real_data):
     assert added - set(before.point_format.dimension_names) == set(ADDED)
 
 
-@pytest.mark.parametrize(("epsg", "said"), [(4326, "degrees"), (2229, "0.304801 m")])
-def test_a_survey_that_is_not_in_metres_is_refused(tmp_path, model, epsg, said):
+@pytest.mark.parametrize(("epsg", "reason"), [(4326, "degrees"), (2229, "0.304801 m")])
+def test_a_survey_that_is_not_in_metres_is_refused(tmp_path, model, epsg, reason):
     """Sizes of voxels and towers are lengths."""
     xyz = np.random.default_rng(0).uniform(0, 80, (50, 3))
     crs = pyproj.CRS.from_epsg(epsg)
     write_las(tmp_path / "far.laz", PointCloud(xyz, np.ones(50, np.uint8), crs=crs))
-    with pytest.raises(InputError, match=rf"far\.laz.*{said}.*Reproject"):
+    with pytest.raises(InputError, match=rf"far\.laz.*{reason}.*Reproject"):
         predict(tmp_path / "far.laz", model, tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []

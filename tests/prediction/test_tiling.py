@@ -60,7 +60,7 @@ def test_chunks_do_not_matter(tmp_path):
     assert voxels_of(spooled(tmp_path / "pieces", xyz, chunk=71)) == voxels_of(whole)
 
 
-def test_the_middle_of_a_voxel_lies_in_it(tmp_path):
+def test_the_centre_of_a_voxel_lies_in_it(tmp_path):
     xyz = survey(n=500) + ORIGIN
     spool = spooled(tmp_path, xyz, 0.9)
     centres = np.concatenate([spool.centres(tile.zyx()) for tile in spool.tiles()])
@@ -70,7 +70,7 @@ def test_the_middle_of_a_voxel_lies_in_it(tmp_path):
     assert len(again) == len(centres)
 
 
-def test_a_halo_holds_what_the_neighbours_have_there(tmp_path):
+def test_a_halo_has_the_voxels_of_the_neighbours(tmp_path):
     spool = spooled(tmp_path, survey())
     reach = (3, 5, 2)
     everything = voxels_of(spool)
@@ -101,7 +101,7 @@ def test_a_tile_without_points_is_empty(tmp_path):
 
 
 @pytest.mark.parametrize("stray", [[1e9, 0, 0], [0, -1e12, 0], [0, 0, np.nan], [np.inf, 0, 0]])
-def test_a_point_too_far_out_is_named(tmp_path, stray):
+def test_a_point_outside_the_lattice_is_named(tmp_path, stray):
     xyz = np.array([[0.0, 0, 0], stray])
     message = r"the point \[.*\] is too far from the origin.*Remove stray"
     with pytest.raises(InputError, match=message):
@@ -109,7 +109,7 @@ def test_a_point_too_far_out_is_named(tmp_path, stray):
 
 
 @given(st.lists(st.integers(-3, 3), max_size=30))
-def test_groups_gather_the_rows_of_each_code(codes):
+def test_groups_have_the_rows_of_each_code(codes):
     found = dict(groups(np.array(codes, np.int64)))
     assert sorted(found) == sorted(set(codes))
     for code, rows in found.items():
@@ -154,7 +154,7 @@ def seamless(spool: TileSpool, model, measurement: str) -> tuple[np.ndarray, np.
     ],
     ids=["scenenet", "even kernel", "cnn"],
 )
-def test_tiles_answer_as_the_whole_survey_does(tmp_path, model, measurement):
+def test_tiles_give_the_prediction_of_the_whole_survey(tmp_path, model, measurement):
     spool = spooled(tmp_path, survey(n=6000))
     assert len(spool) >= 8
     in_tiles, whole = seamless(spool, model, measurement)
@@ -164,7 +164,7 @@ def test_tiles_answer_as_the_whole_survey_does(tmp_path, model, measurement):
 
 @settings(max_examples=10)
 @given(st.tuples(*[st.integers(-70, 70)] * 3), st.integers(0, 99))
-def test_where_the_tiles_lie_does_not_show(tmp_path_factory, shift, seed):
+def test_the_position_of_tiles_has_no_effect(tmp_path_factory, shift, seed):
     model = SceneNet(kernel_size=(5, 5, 5), generator=torch.Generator().manual_seed(seed))
     rng = np.random.default_rng(seed)
     xyz = rng.integers(-8, 8, (300, 3)) + 0.5  # middles of voxels, about the corner of a tile

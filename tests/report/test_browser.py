@@ -69,7 +69,10 @@ def opened(pictures, file: Path, **window):
     faults, asked = [], []
     with pictures.browsing(**window) as tab:
         tab.on("pageerror", lambda error: faults.append(str(error)))
-        tab.on("console", lambda said: faults.append(said.text) if said.type == "error" else None)
+        tab.on(
+            "console",
+            lambda message: faults.append(message.text) if message.type == "error" else None,
+        )
         tab.on("request", lambda request: asked.append(request.url))
         tab.goto(file.as_uri())
         yield tab
@@ -78,7 +81,7 @@ def opened(pictures, file: Path, **window):
 
 
 @SCHEMES
-def test_every_turning_crop_is_drawn_and_turns_under_the_mouse(pictures, page, scene, scheme):
+def test_every_interactive_crop_is_drawn_and_rotates_with_the_mouse(pictures, page, scene, scheme):
     with opened(pictures, page, scheme=scheme) as tab:
         canvases = tab.locator("figure.scene canvas")
         assert canvases.count() == 1
@@ -105,7 +108,7 @@ def test_every_turning_crop_is_drawn_and_turns_under_the_mouse(pictures, page, s
 def test_the_slider_moves_tau_and_the_scores_are_those_of_the_curve(pictures, page, scene):
     curve = ThresholdCurve(np.array(scene["true"]), np.array(scene["false"]))
     with opened(pictures, page) as tab:
-        slider, said = (tab.locator(f"figure.scene {one}") for one in ("input", "output"))
+        slider, scores = (tab.locator(f"figure.scene {one}") for one in ("input", "output"))
         slider.scroll_into_view_if_needed()
         box = slider.bounding_box()
         middle = box["y"] + box["height"] / 2
@@ -118,7 +121,7 @@ def test_the_slider_moves_tau_and_the_scores_are_those_of_the_curve(pictures, pa
             step = int(slider.input_value())
             counts = curve.confusion(step)
             assert f"precision {counts.precision:.3f}, recall {counts.recall:.3f}" in (
-                said.inner_text()
+                scores.inner_text()
             )
             seen.append(step)
         assert seen == sorted(set(seen))
@@ -136,7 +139,7 @@ def test_each_colouring_is_another_picture(pictures, page, scene):
         assert len(drawn) == len(colours)
 
 
-def test_a_table_sorts_by_the_heading_that_is_pressed(pictures, page):
+def test_a_table_sorts_by_the_clicked_heading(pictures, page):
     with opened(pictures, page) as tab:
         table = tab.locator("table", has_text="best on validation").first
         heads = table.locator("thead button")
@@ -152,7 +155,7 @@ def test_a_table_sorts_by_the_heading_that_is_pressed(pictures, page):
 
 
 @SCHEMES
-def test_text_can_be_read_and_dark_is_dark(pictures, page, scheme):
+def test_text_has_contrast_in_the_light_and_the_dark_scheme(pictures, page, scheme):
     with opened(pictures, page, scheme=scheme) as tab:
         contrasts = tab.evaluate(CONTRASTS)
         assert {"h1", "h2", "p", "td", "figcaption", "a"} <= set(contrasts)
@@ -163,7 +166,7 @@ def test_text_can_be_read_and_dark_is_dark(pictures, page, scheme):
 
 
 @pytest.mark.parametrize("width", [PHONE_PX, 768, 1200])
-def test_nothing_makes_the_page_scroll_sideways(pictures, page, scene, width):
+def test_the_page_does_not_scroll_sideways(pictures, page, scene, width):
     with opened(pictures, page, width=width, height=800) as tab:
         content, room = tab.evaluate(
             "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"

@@ -108,7 +108,7 @@ def test_every_experiment_has_settings_a_figure_runs_in_mlflow_and_a_section():
         assert EXPERIMENT_SECTIONS[name] in SECTIONS
 
 
-def test_both_ways_to_count_a_model_have_names_of_their_own():
+def test_both_ways_to_count_have_their_own_names():
     runs = crossed_runs()
     both = pd.concat([runs, runs.assign(voxels=WHOLE_TOWERS)])
     names = [group.parent.name for group in fold_groups(both, Origin("tiny"))]

@@ -54,7 +54,7 @@ def read(path: Path) -> Page:
     return Page(path.read_text(encoding="utf-8"))
 
 
-def test_the_page_is_whole_html(page: Path):
+def test_the_page_is_complete_html(page: Path):
     assert read(page).open == []
 
 
@@ -167,11 +167,11 @@ def test_a_study_has_its_question_figure_table_and_findings(
 
 def test_towers_of_a_classified_survey_are_listed_with_reasons(page: Path):
     text = read(page).text
-    for said in ("512000.00", "20.10", "0.930", "negative sphere [%]", "-10.0"):
-        assert said in text
+    for value in ("512000.00", "20.10", "0.930", "negative sphere [%]", "-10.0"):
+        assert value in text
 
 
-def test_what_comes_from_files_cannot_become_markup(page: Path):
+def test_text_from_files_is_escaped(page: Path):
     html = page.read_text(encoding="utf-8")
     assert "no &lt;CRS&gt; is named" in html
     assert "<CRS>" not in html
@@ -228,11 +228,11 @@ def test_a_broken_picture_is_named(page: Path, results: Results, thesis: Thesis)
         (True, "yes", "yes"),
     ],
 )
-def test_values_are_written_as_people_read_them(value, how, text):
+def test_values_are_formatted_for_readers(value, how, text):
     assert write(value, how) == text
 
 
-def test_models_that_count_in_different_ways_are_also_compared_in_the_same_way(
+def test_models_with_different_protocols_are_also_compared_alike(
     results: Results, thesis: Thesis, tmp_path: Path
 ):
     for seed in results.seeds:

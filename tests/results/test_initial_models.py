@@ -21,7 +21,7 @@ def result(settings: ModelSettings, history: pd.DataFrame | None = None) -> Seed
     return SeedResult(settings.name, settings.kind, 3, {}, history=history, provenance=recorded)
 
 
-def test_the_thesis_protocol_begins_with_the_numbers_of_the_seed(scene):
+def test_the_initial_model_of_the_thesis_protocol_follows_from_the_seed(scene):
     """A training that takes steps of no length ends where it began."""
     cloud = scene(((8.5, 9.5),), size=(20, 20), tree=None)
     crops = [voxelise(cloud, VoxelGrid.metric(cloud.xyz, 1.0), "toy")]
@@ -36,7 +36,7 @@ def test_the_thesis_protocol_begins_with_the_numbers_of_the_seed(scene):
         assert torch.allclose(began, ended, atol=1e-6)
 
 
-def test_kernels_are_shown_at_the_size_that_was_chosen_later():
+def test_initial_kernels_are_shown_at_the_tuned_size():
     settings = ModelSettings(name="m", kind="scenenet", kernel_size=(9, 9, 9))
     tuned = new_model(settings, 3).with_kernel_size((9, 5, 5))
     start = initial_model(result(settings), tuned)
@@ -44,7 +44,7 @@ def test_kernels_are_shown_at_the_size_that_was_chosen_later():
     assert start.model.kernel_size == (9, 5, 5)
 
 
-def test_of_a_search_the_first_row_of_the_history_is_taken():
+def test_the_initial_model_of_a_search_is_the_first_row_of_its_history():
     settings = ModelSettings(name="m", kind="scenenet", protocol="operational")
     trained = new_model(settings, 3).at(0.5)
     assert isinstance(trained, GeneoModel)
@@ -59,7 +59,7 @@ def test_of_a_search_the_first_row_of_the_history_is_taken():
     assert start.model.kernel_size == trained.kernel_size
 
 
-def test_a_start_that_looked_at_the_data_is_not_drawn_again():
+def test_an_initial_model_that_depends_on_data_is_not_drawn_again():
     informed = TrainingSettings(init="informed")
     settings = ModelSettings(name="m", kind="scenenet", training=informed)
     assert initial_model(result(settings), new_model(settings, 3)) is None

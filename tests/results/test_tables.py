@@ -73,7 +73,7 @@ def test_models_have_mean_and_spread_over_seeds(results: Results, thesis: Thesis
     assert (found["thesis_precision"], found["thesis_precision_std"]) == (0.68, 0.08)
 
 
-def test_dead_seeds_count_and_live_ones_have_a_row_of_their_own(results: Results, thesis: Thesis):
+def test_dead_seeds_count_and_live_seeds_have_their_own_row(results: Results, thesis: Thesis):
     found = tables.models(results, thesis)
     every = row(found, model="cnn", counted="all seeds")
     live = row(found, model="cnn", counted="live seeds")
@@ -85,7 +85,7 @@ def test_dead_seeds_count_and_live_ones_have_a_row_of_their_own(results: Results
     assert "live seeds" not in set(found.loc[found["model"] == "scenenet", "counted"])
 
 
-def test_the_trivial_baseline_has_a_row_of_its_own(results: Results, thesis: Thesis):
+def test_the_trivial_baseline_has_its_own_row(results: Results, thesis: Thesis):
     trivial = row(tables.models(results, thesis), model=TRIVIAL)
     assert trivial["miou"] == pytest.approx(0.499)
     assert trivial["precision"] == 0
@@ -98,7 +98,7 @@ def test_the_seed_that_predicts_is_the_best_on_validation(results: Results, thes
     assert best.iloc[0]["precision"] == pytest.approx(0.8)
 
 
-def test_seeds_stand_one_by_one(results: Results, thesis: Thesis):
+def test_each_seed_has_a_row(results: Results, thesis: Thesis):
     found = tables.seeds(results, thesis)
     assert len(found) == 4
     dead = row(found, model="cnn", seed=1)
@@ -233,11 +233,11 @@ def test_the_boosted_trees_have_a_row(results: Results, thesis: Thesis):
 def test_both_ways_to_count_are_in_one_row(results: Results, thesis: Thesis):
     for seed in results.seeds:
         path = results.folder / "evaluate" / "scenenet" / f"seed-{seed}.json"
-        told = json.loads(path.read_text())
-        told["voxel_towers"] = {**told["voxel_towers"], "f05": 0.5 + 0.1 * seed}
-        told["whole_towers"] = True
-        told["voxel"] = told["voxel_towers"]
-        path.write_text(json.dumps(told))
+        record = json.loads(path.read_text())
+        record["voxel_towers"] = {**record["voxel_towers"], "f05": 0.5 + 0.1 * seed}
+        record["whole_towers"] = True
+        record["voxel"] = record["voxel_towers"]
+        path.write_text(json.dumps(record))
     fresh = replace(results)
     table = tables.whole_towers(fresh).set_index("model")
     expected = np.mean([0.5 + 0.1 * seed for seed in results.seeds])

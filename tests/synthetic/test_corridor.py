@@ -51,7 +51,7 @@ def test_stretches_meet_without_gap_or_overlap(small):
     assert np.mean(inside[near] == 1) > 0.999
 
 
-def test_ground_goes_on_across_the_border_of_stretches(bare):
+def test_ground_continues_across_the_border_of_stretches(bare):
     settings = bare(relief=80)
     corridor = make_corridor(settings)
     origin = np.array([settings.easting, settings.northing])
@@ -113,7 +113,7 @@ def test_truth_agrees_with_the_points(default):
     assert (owner > 0).all(), "no tower points but at towers"
 
 
-def test_wires_run_from_tower_to_tower_above_the_ground(small):
+def test_conductors_run_from_tower_to_tower_above_the_ground(small):
     corridor = make_corridor(small(bend_share=0.5, relief=60))
     for stretch in list(corridor)[1:-1]:
         k = stretch.index

@@ -39,7 +39,7 @@ def test_every_kind_of_clutter(bare, kind):
     assert len(above) > 30
 
 
-def test_nothing_stands_about_where_nothing_is_asked_for(bare):
+def test_without_clutter_settings_there_is_no_clutter(bare):
     _, truth, _ = corridor_cloud(bare())
     assert set(np.unique(truth).tolist()) <= {*ON_GROUND, TOWER, CONDUCTOR}
 

@@ -88,7 +88,7 @@ def log(settings: TrackingSettings, results: Results, tmp_path: Path, **more) ->
     return {key.split("/", 2)[2]: run["status"] for key, run in written["runs"].items()}
 
 
-def test_a_training_is_a_run_with_all_that_is_known_of_it(settings, client, results, tmp_path):
+def test_a_training_is_a_run_with_all_its_facts(settings, client, results, tmp_path):
     log(settings, results, tmp_path, protocol="20/10/70 by stretch")
     (run,) = runs(client)["scenenet seed 1"]
     assert run.info.status == "FINISHED"
@@ -219,10 +219,10 @@ def test_a_parent_has_the_summary_of_the_runs_under_it(settings, client, results
 
 
 def test_the_boosted_trees_have_runs_like_the_models(settings, client, results, tmp_path):
-    told = json.loads((results.folder / "evaluate" / "scenenet" / "seed-1.json").read_text())
+    record = json.loads((results.folder / "evaluate" / "scenenet" / "seed-1.json").read_text())
     box = results.folder / "boosted_trees" / "seed-1.json"
     box.parent.mkdir()
-    box.write_text(json.dumps(told | {"model": BOOSTED_TREES}))
+    box.write_text(json.dumps(record | {"model": BOOSTED_TREES}))
     log(settings, results, tmp_path)
     (parent,) = runs(client)["boosted trees (corridors)"]
     (seed,) = runs(client)["boosted trees seed 1"]
@@ -267,7 +267,7 @@ def test_a_seed_that_is_no_longer_configured_leaves_the_group(settings, client, 
     ]  # fmt: skip
 
 
-def test_other_data_and_other_peoples_runs_stay(settings, client, results, tmp_path):
+def test_other_data_and_runs_of_other_users_stay(settings, client, results, tmp_path):
     experiment = client.get_experiment_by_name("scenenet").experiment_id
     client.create_run(experiment, run_name="by hand")
     log(settings, results, tmp_path)
@@ -278,7 +278,7 @@ def test_other_data_and_other_peoples_runs_stay(settings, client, results, tmp_p
     assert {"scenenet (corridors)", "scenenet (ts40k)"} <= set(found)
 
 
-def test_a_run_that_was_cut_off_is_made_anew(settings, client, results, tmp_path):
+def test_an_interrupted_run_is_logged_again(settings, client, results, tmp_path):
     log(settings, results, tmp_path)
     (run,) = runs(client)["cnn seed 0"]
     client.delete_tag(run.info.run_id, "scenenet.digest")
@@ -286,7 +286,7 @@ def test_a_run_that_was_cut_off_is_made_anew(settings, client, results, tmp_path
     assert len(runs(client)["cnn seed 0"]) == 1
 
 
-def test_an_experiment_deleted_by_hand_comes_back_without_twins(
+def test_an_experiment_deleted_by_hand_is_restored_without_duplicates(
     settings, client, results, tmp_path
 ):
     log(settings, results, tmp_path)
@@ -318,9 +318,9 @@ def test_a_database_with_runs_of_others_is_kept(empty_database, tmp_path):
     settings = TrackingSettings(uri=f"sqlite:///{tmp_path / 'mlflow.db'}")
     client = MlflowClient(tracking_uri=settings.uri)
     location = (tmp_path / "elsewhere").as_uri()
-    theirs = client.create_run(client.create_experiment("theirs", location)).info.run_id
+    other = client.create_run(client.create_experiment("other", location)).info.run_id
     create_store(settings, tmp_path / "store.json", experiments=["ablation"])
-    assert client.get_run(theirs).info.run_id == theirs
+    assert client.get_run(other).info.run_id == other
     record = json.loads((tmp_path / "store.json").read_text())
     assert set(record["experiments"]) == {"scenenet", "ablation"}
 
@@ -334,11 +334,11 @@ def test_two_processes_may_make_the_store_at_once(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("revision", "said"),
+    ("revision", "reason"),
     [("ffffffffffff", "a newer version"), ("451aebb31d03", "an older version")],
 )
 def test_a_store_of_another_version_is_refused_and_left_as_it_is(
-    empty_database, tmp_path, revision, said
+    empty_database, tmp_path, revision, reason
 ):
     database = tmp_path / "mlflow.db"
     shutil.copyfile(empty_database, database)
@@ -348,7 +348,7 @@ def test_a_store_of_another_version_is_refused_and_left_as_it_is(
     connection.close()
     before = database.read_bytes()
     settings = TrackingSettings(uri=f"sqlite:///{database}")
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(InputError, match=reason):
         create_store(settings, tmp_path / "store.json")
     assert database.read_bytes() == before
 
@@ -362,7 +362,7 @@ def test_a_file_that_is_no_store_is_refused(tmp_path):
     assert database.read_text() == "tower"
 
 
-def test_a_store_moved_away_from_its_artifacts_is_refused(settings, tmp_path):
+def test_a_store_without_its_artifacts_is_refused(settings, tmp_path):
     moved = tmp_path / "moved"
     moved.mkdir()
     (tmp_path / "mlflow.db").rename(moved / "mlflow.db")
@@ -372,7 +372,7 @@ def test_a_store_moved_away_from_its_artifacts_is_refused(settings, tmp_path):
         create_store(other, tmp_path / "store.json")
 
 
-def test_the_folder_store_mlflow_gave_up_is_refused(tmp_path):
+def test_the_deprecated_folder_store_is_refused(tmp_path):
     with pytest.raises(InputError, match="MLflow refused the store"):
         create_store(TrackingSettings(uri=str(tmp_path / "mlruns")), tmp_path / "store.json")
 

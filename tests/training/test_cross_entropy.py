@@ -49,9 +49,11 @@ def test_value_and_gradient_are_those_of_torch(seed, bias, share):
     kernel, offset = numbers(seed, bias)
     inputs = [kernel] if offset is None else [kernel, offset]
     ours = cross_entropy(occupancy, kernel, offset, tower, WEIGHTS)
-    theirs = plain(occupancy, kernel, offset, tower)
-    torch.testing.assert_close(ours, theirs, rtol=1e-9, atol=1e-9)
-    pairs = zip(torch.autograd.grad(ours, inputs), torch.autograd.grad(theirs, inputs), strict=True)
+    expected = plain(occupancy, kernel, offset, tower)
+    torch.testing.assert_close(ours, expected, rtol=1e-9, atol=1e-9)
+    pairs = zip(
+        torch.autograd.grad(ours, inputs), torch.autograd.grad(expected, inputs), strict=True
+    )
     for a, b in pairs:
         torch.testing.assert_close(a, b, rtol=1e-6, atol=1e-6)
 
@@ -66,7 +68,7 @@ def test_by_hand():
     assert beside_it.item() == pytest.approx(-2 * math.log(1 - p) - 8 * math.log(LEAST))
 
 
-def test_an_observer_that_is_silent_everywhere_costs_its_towers_and_has_no_slope():
+def test_an_observer_without_response_has_the_error_of_its_towers_and_no_slope():
     occupancy, tower = scene(3, 0.3)
     kernel = torch.full((3, 2, 3), -1.0, requires_grad=True)
     loss = cross_entropy(occupancy, kernel, None, tower, WEIGHTS)
@@ -75,7 +77,7 @@ def test_an_observer_that_is_silent_everywhere_costs_its_towers_and_has_no_slope
     assert not slope.any()
 
 
-def test_a_wrong_answer_whose_probability_is_1_still_costs_and_has_a_slope():
+def test_a_wrong_probability_of_1_has_a_finite_error_and_a_slope():
     occupancy = Occupancy.of_grids([np.array([1])], None, (1, 1, 3))
     kernel = torch.full((1, 1, 1), 40.0, requires_grad=True)
     assert torch.tanh(kernel).item() == 1.0
@@ -85,7 +87,7 @@ def test_a_wrong_answer_whose_probability_is_1_still_costs_and_has_a_slope():
     assert slope.item() == pytest.approx(2.0)  # 1 + p
 
 
-def test_what_is_not_a_number_makes_an_error_that_is_none():
+def test_nan_in_the_kernel_gives_a_nan_error():
     occupancy, tower = scene(3, 0.3)
     kernel = torch.full((3, 3, 3), float("nan"))
     assert torch.isnan(cross_entropy(occupancy, kernel, None, tower, WEIGHTS))

@@ -32,7 +32,7 @@ def best(model, samples) -> float:
     return threshold_curve(model, samples, "presence").best()[1].f05
 
 
-def test_the_discriminant_answers_higher_at_towers_than_a_mean_difference_does(toys):
+def test_the_discriminant_separates_towers_better_than_a_mean_difference(toys):
     size = (5, 5, 5)
     kernel = discriminant(toys, "presence", size)
     assert kernel.shape == size
@@ -55,7 +55,7 @@ def test_the_discriminant_answers_higher_at_towers_than_a_mean_difference_does(t
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-def test_it_begins_where_towers_are_told_from_the_rest(toys, kind, seed):
+def test_the_initial_model_separates_towers_from_the_rest(toys, kind, seed):
     assert best(informed_model(settings(kind), seed, toys), toys) > 0.2
 
 
@@ -66,7 +66,7 @@ def test_a_cnn_is_alive_after_training(toys, seed):
 
 
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-def test_seeds_begin_apart_and_one_seed_begins_at_one_place(toys, kind):
+def test_initial_models_differ_between_seeds_and_are_reproducible(toys, kind):
     one, same, other = (informed_model(settings(kind), s, toys) for s in (1, 1, 2))
     for a, b in zip(one.parameters(), same.parameters(), strict=True):
         assert torch.equal(a, b)
@@ -74,29 +74,29 @@ def test_seeds_begin_apart_and_one_seed_begins_at_one_place(toys, kind):
     assert any(not torch.equal(a, b) for a, b in pairs)
 
 
-def test_the_thesis_start_is_the_one_that_is_drawn_from_the_ranges(toys):
-    begun = starting_model(settings("scenenet", "thesis"), 3, toys)
+def test_the_initial_model_of_the_thesis_is_drawn_from_the_ranges(toys):
+    initial = starting_model(settings("scenenet", "thesis"), 3, toys)
     drawn = new_model(settings("scenenet", "thesis"), 3)
-    assert begun.shape_parameters() == drawn.shape_parameters()
-    for name in begun.names:
+    assert initial.shape_parameters() == drawn.shape_parameters()
+    for name in initial.names:
         for parameter in kernel_named(name).parameters:
-            value = begun.shape_parameters()[f"{name}.{parameter.name}"]
+            value = initial.shape_parameters()[f"{name}.{parameter.name}"]
             assert parameter.low <= value <= parameter.high
 
 
-def test_without_ranges_numbers_are_normal_and_mostly_outside_of_them(toys):
-    told = [
+def test_unranged_parameters_are_normal_and_mostly_outside_the_ranges(toys):
+    vectors = [
         starting_model(settings("scenenet", "unranged"), seed, toys).numbers() for seed in range(60)
     ]
-    drawn = np.concatenate(told)
+    drawn = np.concatenate(vectors)
     assert abs(drawn.mean()) < 0.15
     assert abs(drawn.std() - 1) < 0.1
     assert 0.4 < (drawn < 0).mean() < 0.6
     again = starting_model(settings("scenenet", "unranged"), 7, toys).numbers()
-    np.testing.assert_array_equal(told[7], again)
+    np.testing.assert_array_equal(vectors[7], again)
 
 
-def test_values_by_hand_lie_in_their_ranges_and_are_the_same_for_every_seed(toys):
+def test_handcrafted_values_are_in_their_ranges_and_equal_for_every_seed(toys):
     chosen = settings("scenenet", "handcrafted")
     chosen = chosen.model_copy(update={"geneos": ("cylinder", "arrow", "negative_sphere", "arrow")})
     one, other = (starting_model(chosen, seed, toys) for seed in (0, 1))
@@ -110,6 +110,6 @@ def test_values_by_hand_lie_in_their_ranges_and_are_the_same_for_every_seed(toys
 
 
 @pytest.mark.parametrize("init", ["unranged", "handcrafted"])
-def test_a_cnn_has_no_ranges_to_leave(init):
+def test_unranged_initialisation_of_a_cnn_is_refused(init):
     with pytest.raises(ValueError, match=r"training.init .* a CNN has no parameter ranges"):
         settings("cnn", init)

@@ -69,7 +69,7 @@ def test_fidelity_is_the_mean_of_the_weighted_squared_error(seed, share):
     torch.testing.assert_close(fidelity(model, occupancy, tower, weights), expected)
 
 
-def test_a_model_that_says_nothing_errs_by_the_weight_of_the_towers():
+def test_the_error_of_a_model_without_detections_is_the_weight_of_the_towers():
     occupancy, tower = scene(1)
     model = CNN(1, (3, 3, 3))
     with torch.no_grad():
@@ -98,14 +98,14 @@ POSITIVE = {
         ({"lambda.cylinder": -0.5, "lambda.negative_sphere": 1.2, "arrow.r": -1.0}, 3 * 0.5 + 2),
     ],
 )
-def test_what_is_negative_costs_rho_times_what_it_lacks(changes, penalty):
+def test_a_negative_parameter_costs_rho_times_its_absolute_value(changes, penalty):
     model = SceneNet()
     model.set_shape_parameters(POSITIVE | changes)
     settings = LossSettings(rho_shape=2.0, rho_mixing=3.0)
     assert negativity(model, settings).item() == pytest.approx(penalty, abs=1e-6)
 
 
-def test_the_penalty_pushes_a_negative_number_up_and_leaves_the_others():
+def test_the_penalty_only_raises_negative_parameters():
     model = SceneNet()
     model.set_shape_parameters(POSITIVE | {"cylinder.sigma": -0.5})
     negativity(model, LossSettings(rho_shape=5.0)).backward()
@@ -146,7 +146,7 @@ def test_fidelity_is_the_mean_of_the_weighted_cross_entropy(seed):
     torch.testing.assert_close(got.double(), expected, rtol=1e-4, atol=1e-5)
 
 
-def test_a_cnn_has_nothing_to_be_negative_about():
+def test_a_cnn_has_no_penalty():
     assert negativity(CNN(), LossSettings()).item() == 0.0
 
 

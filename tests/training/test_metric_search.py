@@ -62,7 +62,7 @@ def assert_constrained(numbers: dict[str, float]) -> None:
 
 
 @given(st.lists(st.floats(-1e4, 1e4), min_size=11, max_size=11))
-def test_whatever_the_numbers_are_the_constraints_hold(raw):
+def test_the_constraints_hold_for_any_stored_numbers(raw):
     model = net()
     assert model.n_parameters() == 11
     model.set_numbers(np.array(raw))
@@ -70,7 +70,7 @@ def test_whatever_the_numbers_are_the_constraints_hold(raw):
     assert torch.isfinite(model.observer()[0]).all()
 
 
-def test_they_hold_at_every_step_and_in_the_saved_model(toys, tmp_path):
+def test_the_constraints_hold_at_every_step_and_in_the_saved_model(toys, tmp_path):
     model, history = fit(toys[:3], toys[3:], settings(), 0)
     shown = list(model.shape_parameters())
     for _, row in history.iterrows():
@@ -90,7 +90,7 @@ def test_the_search_finds_the_poles_and_gets_no_worse(toys):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_no_start_is_dead(toys, seed):
+def test_no_initial_model_is_dead(toys, seed):
     model, _ = fit(toys[:3], [], settings(2), seed)
     assert threshold_curve(model, toys[:3], "presence").best()[1].f05 > 0.3
 
@@ -153,14 +153,14 @@ def test_half_the_voxel_size_covers_the_same_metres():
     torch.testing.assert_close(of_fine[::2, ::2, ::2], sphere / 2)
 
 
-def test_a_finer_model_learns_with_the_other():
+def test_a_model_at_another_voxel_size_shares_the_parameters():
     model = net(1)
     fine = model.at(0.5)
     model.set_numbers(np.zeros(11))
     assert fine.shape_parameters() == model.shape_parameters()
 
 
-def test_a_column_of_so_many_metres_has_the_same_answer_on_every_grid():
+def test_a_column_of_a_given_height_has_the_same_response_on_every_grid():
     answers = []
     for voxel_size in (1.0, 0.5, 0.25):
         model = net(4).at(voxel_size)
@@ -182,7 +182,7 @@ def test_kernels_lie_within_their_lengths_and_sum_to_zero():
     torch.testing.assert_close(kernels.rot90(1, (2, 3)), kernels)
 
 
-def test_an_empty_voxel_is_no_tower(toys):
+def test_an_empty_voxel_has_probability_0(toys):
     probability, _ = probabilities(net(3), toys[0], "presence")
     empty = np.ones(len(probability), bool)
     empty[toys[0].index] = False
@@ -197,7 +197,7 @@ def card_for(model: SceneNet) -> ModelCard:
     )  # fmt: skip
 
 
-def test_its_file_says_metres_and_reads_back(tmp_path):
+def test_its_file_has_units_of_metres_and_reads_back(tmp_path):
     model = net(5)
     write_model(tmp_path / "m.json", model, card_for(model))
     written = json.loads((tmp_path / "m.json").read_text())
@@ -239,7 +239,7 @@ def test_a_file_with_a_number_out_of_bounds_is_refused(tmp_path, name, value, me
         read_model(tmp_path / "m.json")
 
 
-def test_it_has_no_other_kernel_size():
+def test_a_model_in_metres_has_no_other_kernel_size():
     with pytest.raises(InputError, match="in metres"):
         net().with_kernel_size((9, 9, 9))
 

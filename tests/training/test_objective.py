@@ -42,7 +42,7 @@ def test_the_search_climbs_a_narrow_ridge():
     np.testing.assert_allclose(settled(state, bowl).best, [1, 2, 3, 4], atol=1e-3)
 
 
-def test_it_begins_at_the_best_start_and_never_forgets_the_best():
+def test_the_search_starts_at_the_best_draw_and_keeps_the_best():
     starts = np.array([[9.0, 9.0], [1.0, 2.5], [-3.0, 0.0]])
     state = begin(starts, bowl, 0.1)
     assert state.best.tolist() == [1.0, 2.5]
@@ -54,7 +54,7 @@ def test_it_begins_at_the_best_start_and_never_forgets_the_best():
     assert scores == sorted(scores)
 
 
-def test_the_middle_is_taken_unless_the_best_draw_is_clearly_better():
+def test_the_mean_is_returned_unless_the_best_draw_is_clearly_better():
     def score(x):
         return float(x[0])
 
@@ -98,7 +98,7 @@ def test_draws_cover_the_ranges_and_all_mixtures():
 
 
 @pytest.mark.parametrize("voxel_size", [1.0, 0.5])
-def test_scenes_are_answered_as_the_model_does(scene, voxel_size):
+def test_prepared_crops_give_the_probabilities_of_the_model(scene, voxel_size):
     cloud = scene(size=(16, 16), poles=((8.5, 8.5),), tree=(3, 3))
     sample = voxelise(cloud, VoxelGrid.metric(cloud.xyz, voxel_size))
     net = model(3)

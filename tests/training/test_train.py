@@ -131,7 +131,7 @@ def test_a_rate_that_has_decayed_moves_less(toys):
 
 
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-def test_cross_entropy_falls_too_and_is_what_validation_tells(toys, kind):
+def test_cross_entropy_falls_and_is_the_validation_loss(toys, kind):
     init = "informed" if kind == "cnn" else "thesis"
     chosen = settings(kind, epochs=30, init=init, loss=LossSettings(fidelity="cross_entropy"))
     model, history = fit(toys[:3], toys[3:], chosen, seed=0)
@@ -140,8 +140,8 @@ def test_cross_entropy_falls_too_and_is_what_validation_tells(toys, kind):
     n_tower, n = sum(t.tower.sum() for t in toys[:3]), sum(t.grid.n_voxels for t in toys[:3])
     weights = VoxelWeights.of_counts(n_tower, n, alpha=5.0, epsilon=0.1)
     with torch.no_grad():
-        told = fidelity(model, occupancy, towers, weights, "cross_entropy").item()
-    assert history["validation_loss"].iloc[-1] == pytest.approx(told)
+        recomputed = fidelity(model, occupancy, towers, weights, "cross_entropy").item()
+    assert history["validation_loss"].iloc[-1] == pytest.approx(recomputed)
 
 
 @pytest.mark.parametrize("what", ["settings", "seed", "samples", "nothing but noise"])
@@ -168,7 +168,7 @@ def test_a_checkpoint_of_something_else_is_ignored(toys, cut_after, tmp_path, wh
     assert numbers(model) == numbers(fresh)
 
 
-def test_history_has_a_row_an_epoch_and_a_column_a_number(toys):
+def test_history_has_a_row_per_epoch_and_a_column_per_parameter(toys):
     model, history = fit(toys[:3], toys[3:], settings(epochs=4), 0)
     assert history["epoch"].tolist() == [1, 2, 3, 4]
     assert history.columns[:7].tolist() == [
@@ -187,7 +187,7 @@ def test_a_cnn_has_no_columns_for_its_2190_numbers(toys):
 
 
 @pytest.mark.parametrize("poles", ["no crop", "no pole"])
-def test_nothing_to_learn_from_is_refused(scene, poles):
+def test_training_without_tower_voxels_is_refused(scene, poles):
     cloud = scene(poles=())
     samples = [voxelise(cloud, VoxelGrid.metric(cloud.xyz, 1.0))] if poles == "no pole" else []
     with pytest.raises(InputError, match=r"no tower voxel in the \d training crops.*class scheme"):
@@ -204,7 +204,7 @@ def test_order_of_validation_samples_does_not_matter(toys, pole_finder):
     assert forth.true.sum() + forth.false.sum() == sum(s.grid.n_voxels for s in toys)
 
 
-def test_crops_of_different_sizes_are_answered_in_a_batch_as_alone(scene, pole_finder):
+def test_crops_of_different_sizes_are_predicted_alike_in_a_batch_and_alone(scene, pole_finder):
     clouds = [scene(((8.5, 8.5),), size=(20, 17), tree=None), scene(size=(30, 30))]
     samples = [voxelise(c, VoxelGrid.metric(c.xyz, 1.0)) for c in clouds]
     model, _ = pole_finder
@@ -223,7 +223,7 @@ def test_crops_of_different_sizes_are_answered_in_a_batch_as_alone(scene, pole_f
     np.testing.assert_array_equal(flat[towers], np.concatenate(expected))
 
 
-def test_training_writes_model_and_history_and_takes_its_checkpoint_away(chain, tmp_path):
+def test_training_writes_model_and_history_and_removes_its_checkpoint(chain, tmp_path):
     out = {name: tmp_path / name for name in ("model.json", "history.csv", "checkpoint")}
     train(
         [chain.voxels], chain.split, settings(epochs=2), 3, out["model.json"], out["history.csv"],

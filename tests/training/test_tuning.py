@@ -72,7 +72,7 @@ def test_a_cnn_has_no_other_size(crops, pole_finder):
     assert [entry["kernel_size"] for entry in result["kernel_sizes"]] == [[5, 5, 5]]
 
 
-def test_only_validation_crops_are_looked_at(chain, pole_finder, tmp_path):
+def test_tuning_only_uses_validation_crops(chain, pole_finder, tmp_path):
     model, card = pole_finder
     write_model(tmp_path / "m.json", model, card.model_copy(update={"tau": None}))
     result = tune(

@@ -45,7 +45,7 @@ def _variable(html: str, name: str) -> dict:
     return json.JSONDecoder().raw_decode(html, begin.end())[0]
 
 
-def test_the_report_has_everything_with_words_for_it_and_changes_nothing(reported, shown):
+def test_the_report_has_every_result_with_a_caption_and_changes_nothing(reported, shown):
     made = [
         *reported.results.glob("tables/*.csv"),
         *reported.results.glob("figures/*.png"),
@@ -59,9 +59,9 @@ def test_the_report_has_everything_with_words_for_it_and_changes_nothing(reporte
     missing = {str(path.relative_to(reported.folder)) for path in made} - set(shown)
     assert missing == set()
     for path, entry in shown.items():
-        said = re.sub(r"<[^>]+>", "", entry["caption"])
-        assert len(said) > 40, path
-        assert "{" not in said and "Undefined" not in said, path
+        text = re.sub(r"<[^>]+>", "", entry["caption"])
+        assert len(text) > 40, path
+        assert "{" not in text and "Undefined" not in text, path
         assert entry["category"] in {
             "1 Page", "2 Models", "3 New surveys", "4 Studies", "5 Data", "6 How it was made"
         }, path  # fmt: skip
@@ -90,7 +90,7 @@ def test_another_caption_reruns_nothing(project):
     assert project.planned() == {}
 
 
-def test_every_caption_is_of_something(project_root: Path):
+def test_every_caption_belongs_to_a_result(project_root: Path):
     rules = "".join(p.read_text() for p in (project_root / "workflow/rules").glob("*.smk"))
     for caption in (project_root / "workflow/report").glob("*.rst"):
         kind = caption.stem.removeprefix("figure-").removeprefix("table-")

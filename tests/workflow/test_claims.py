@@ -86,10 +86,10 @@ def recounted(finished) -> dict[str, float]:
         index, tower = store[crop]["index"][...], store[crop]["tower"][...].astype(bool)
         occupied, truth = np.zeros(math.prod(shape)), np.zeros(math.prod(shape), bool)
         occupied[index], truth[index[tower]] = 1, True
-        said = answer_of(kernel, occupied.reshape(shape)).reshape(-1) >= model["tau"]
-        tp += int((said & truth).sum())
-        fp += int((said & ~truth).sum())
-        fn += int((~said & truth).sum())
+        predicted = answer_of(kernel, occupied.reshape(shape)).reshape(-1) >= model["tau"]
+        tp += int((predicted & truth).sum())
+        fp += int((predicted & ~truth).sum())
+        fn += int((~predicted & truth).sum())
     precision, recall = tp / max(1, tp + fp), tp / (tp + fn)
     assert tp > 0, "a model that finds nothing proves nothing here"
     return {
@@ -111,8 +111,8 @@ def claimed(results: Path, seed: str) -> dict[str, str]:
 
 @pytest.mark.parametrize("score", ["precision", "recall", "f05", "iou_tower"])
 def test_a_score_in_the_table_is_that_of_the_model_on_the_crops_scored(finished, recounted, score):
-    told = float(claimed(finished.results, recounted["seed"])[score])
-    assert told == pytest.approx(recounted[score], abs=AT_THE_BORDER)
+    reported = float(claimed(finished.results, recounted["seed"])[score])
+    assert reported == pytest.approx(recounted[score], abs=AT_THE_BORDER)
 
 
 class Rows(HTMLParser):

@@ -31,7 +31,7 @@ def test_a_typo_on_the_command_line(project):
     assert "ts40kdir: there is no such setting. Did you mean 'ts40k_dir'?" in message
 
 
-def test_all_that_is_wrong_with_the_sheet(project):
+def test_all_problems_of_the_sheet(project):
     project.add_row("own", "data/own.laz", "edpp", "new")
     project.add_row("other", "data/onw.laz", "edp", "new")
     message = short(project.refused())

@@ -87,19 +87,19 @@ def test_naming_other_class_codes_runs_the_jobs_that_read_them(project):
     assert project.planned() == {"check": 1, "report": 1}
 
 
-def test_the_order_and_the_date_of_the_sheet_decide_on_nothing(project):
+def test_the_order_and_the_date_of_the_sheet_have_no_effect(project):
     sheet = project.folder / "config/surveys.tsv"
     header, *rows = sheet.read_text().splitlines()
     sheet.write_text("\n".join([header, "# mine", *reversed(rows)]) + "\n")
     assert project.planned() == {}
 
 
-def test_taking_a_survey_out_of_the_sheet_only_writes_the_report_again(project):
+def test_removing_a_survey_from_the_sheet_only_writes_the_report_again(project):
     project.edit("config/surveys.tsv", "own\tdata/own.laz\tedp\tnew\n", "")
     assert project.planned() == {"report": 1}
 
 
-def test_another_recipe_makes_one_synthetic_survey_anew(project):
+def test_another_recipe_generates_one_synthetic_survey_again(project):
     project.edit("config/config.yaml", "seed: 2", "seed: 22")
     own = {"synthesize": 1, "check": 1, "towers": 1, "crops": 1, "voxels": 1, "tower_map": 1,
            "survey_map": 1}  # fmt: skip
@@ -120,7 +120,7 @@ def test_swapping_the_values_of_two_settings_trains_again(project):
     assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOISE}
 
 
-def test_writing_a_default_down_changes_nothing(project):
+def test_writing_out_a_default_changes_nothing(project):
     project.configure({"training.loss": {"alpha": 5, "epsilon": 0.1}, "towers.eps": 10})
     assert project.planned() == {}
 
@@ -131,7 +131,7 @@ def test_a_setting_of_one_stage_runs_that_stage_and_what_follows(project):
     assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BASELINE}
 
 
-def test_another_resolution_keeps_the_grids_there_are(project):
+def test_another_resolution_keeps_the_existing_grids(project):
     project.configure({"voxels.resolution": 64})
     assert project.planned() == {**SETTINGS, "voxels": 2, **LEARNED, **NOISE}
     assert (project.results / "voxels/first/cube-32/manifest.json").exists()
@@ -167,8 +167,8 @@ def test_one_more_model_leaves_the_others_alone(project):
 
 def test_another_study_runs_itself_and_what_shows_it(project):
     study = {"name": "seeds", "title": "t", "place": "5.3", "asks": "?", "seeds": [0, 1]}
-    told = [*project.configured("studies"), {**study, "variants": [{"name": "as it is"}]}]
-    project.configure({"studies": told})
+    studies = [*project.configured("studies"), {**study, "variants": [{"name": "as it is"}]}]
+    project.configure({"studies": studies})
     own = {"study": 1, "study_figure": 1, "track_studies": 1}
     shown = {"tables": 1, "report": 1, "mlflow_store": 1, "track": 1, "register": 1}
     assert project.planned() == {**SETTINGS, **own, **shown, "track_experiment": 1}
@@ -184,7 +184,7 @@ def test_one_more_seed_of_wrong_labels_trains_only_that_seed(project):
     assert project.planned() == {**SETTINGS, **NOISE, "label_noise": 1, "tables": 1, "report": 1}
 
 
-def test_cross_validation_is_one_job_a_model_and_reads_the_grids_there_are(project):
+def test_cross_validation_is_one_job_per_model_and_reads_the_existing_grids(project):
     project.configure({"cross_validation": {"leave_out": 2}})
     own = {"cross_validation": 3, "join_runs": 1, "experiment_figure": 1}
     logged = {
@@ -288,12 +288,12 @@ def test_a_deleted_mlflow_store_is_made_again_with_all_its_runs(project):
     assert project.planned() == {"mlflow_store": 1, **logged, "report": 1}
 
 
-def test_what_others_log_to_the_mlflow_store_runs_nothing(project):
+def test_runs_that_other_users_log_to_mlflow_run_nothing(project):
     (project.folder / "mlflow.db").touch()
     assert project.planned() == {}
 
 
-def test_other_published_numbers_are_put_beside_ours_without_training(project):
+def test_other_published_numbers_are_compared_without_training(project):
     project.edit("config/thesis.yaml", "source: ", "source: Once more, ")
     drawn = {"figures": 1, "study_figure": 2, "track": 1, "track_studies": 1, "register": 1}
     assert project.planned() == {"tables": 1, **drawn, "report": 1}

@@ -33,7 +33,7 @@ def rules(root) -> dict[str, dict[str, list[str]]]:
     return found
 
 
-def test_every_rule_fills_in_the_form_in_order(project_root):
+def test_every_rule_has_its_directives_in_order(project_root):
     found = rules(project_root)
     assert len(found) > 30
     for name, directives in found.items():
@@ -72,7 +72,7 @@ def test_snakemake_finds_nothing_to_improve(finished):
 
 
 @pytest.mark.parametrize("name", ["default", "slurm"])
-def test_profiles_leave_out_the_date_of_scripts_and_go_on_after_a_stop(project_root, name):
+def test_profiles_ignore_the_date_of_scripts_and_continue_after_a_stop(project_root, name):
     profile = project_root / "workflow" / "profiles" / name / "config.yaml"
     settings = yaml.safe_load(profile.read_text())
     assert settings["rerun-triggers"] == ["mtime", "params", "input", "software-env"]

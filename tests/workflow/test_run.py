@@ -58,7 +58,7 @@ def test_the_scores_are_shown_at_the_end(finished):
         assert word in scores
 
 
-def test_a_single_result_can_be_asked_for_before_there_are_scores(project):
+def test_a_single_result_can_be_requested_before_there_are_scores(project):
     shutil.rmtree(project.results / "tables")
     assert "Scores" not in project.run("results/check/own/report.json", "--force")
 
@@ -69,13 +69,13 @@ def test_progress_of_a_job_is_on_the_terminal_and_in_its_log(finished):
     assert line in (finished.results / "logs/train/scenenet-seed-0.log").read_text()
 
 
-def test_the_settings_written_down_are_those_of_the_run(finished):
+def test_the_recorded_settings_are_those_of_the_run(finished):
     written = yaml.safe_load((finished.results / "config.yaml").read_text())
     given = yaml.safe_load((finished.folder / "config" / "config.yaml").read_text())
     assert load(written) == load(given)
 
 
-def test_every_job_says_what_its_result_was_made_from(finished):
+def test_every_job_records_the_provenance_of_its_result(finished):
     records = [read_json(p) for p in finished.results.glob("**/*provenance.json")]
     stages = {record["stage"] for record in records}
     assert stages == STAGES

@@ -65,7 +65,7 @@ STUDIES = {
 
 
 @pytest.mark.parametrize("place", TABLES)
-def test_a_table_is_there_with_the_thesis_beside(finished, place):
+def test_a_table_exists_with_the_numbers_of_the_thesis(finished, place):
     path, published = TABLES[place]
     table = pd.read_csv(finished.results / path)
     assert len(table) > 0
@@ -73,12 +73,12 @@ def test_a_table_is_there_with_the_thesis_beside(finished, place):
 
 
 @pytest.mark.parametrize("place", FIGURES)
-def test_a_figure_is_there_with_a_caption_and_words_for_it(finished, place):
+def test_a_figure_exists_with_a_caption_and_an_alternative_text(finished, place):
     picture = finished.results / "figures" / f"{FIGURES[place]}.png"
     assert picture.stat().st_size > 5000
-    said = read_json(picture.with_suffix(".json"))
-    assert len(said["caption"]) > 60
-    assert len(said["alt"]) > 40
+    entry = read_json(picture.with_suffix(".json"))
+    assert len(entry["caption"]) > 60
+    assert len(entry["alt"]) > 40
 
 
 def test_5_2_5_is_an_experiment_with_label_noise_scored_against_the_truth_as_well(finished):
@@ -97,23 +97,23 @@ def test_5_2_5_is_an_experiment_with_label_noise_scored_against_the_truth_as_wel
 
 
 @pytest.mark.parametrize("place", FIGURES)
-def test_a_figure_is_on_the_page_and_says_which_of_the_thesis_it_stands_beside(finished, place):
-    said = read_json(finished.results / "figures" / f"{FIGURES[place]}.json")
+def test_a_figure_is_on_the_page_and_names_its_counterpart_in_the_thesis(finished, place):
+    entry = read_json(finished.results / "figures" / f"{FIGURES[place]}.json")
     page = (finished.results / "report" / "index.html").read_text(encoding="utf-8")
-    assert escape(said["alt"]) in page
+    assert escape(entry["alt"]) in page
     number = re.search(r"\d[.\d]*\d", place)
-    assert number[0] in said["caption"], said["caption"]
+    assert number[0] in entry["caption"], entry["caption"]
 
 
 def test_the_three_kernels_are_drawn_before_training_and_after(finished):
-    said = read_json(finished.results / "figures" / "kernels-scenenet.json")
+    entry = read_json(finished.results / "figures" / "kernels-scenenet.json")
     for kernel in ("cylinder", "arrow", "negative_sphere"):
         for stage in ("at the start", "trained"):
-            assert f"{kernel} {stage} from" in said["alt"]
-    assert "drawn from the seed" in said["caption"]
+            assert f"{kernel} {stage} from" in entry["alt"]
+    assert "drawn from the seed" in entry["caption"]
 
 
-def test_every_number_is_in_metres_and_read_out(finished):
+def test_every_parameter_is_in_metres_with_a_sentence(finished):
     table = pd.read_csv(finished.results / "tables" / "parameters.csv")
     assert len(table) == 12
     assert set(table["unit"].astype(str)) == {"m", "m^2", "1"}
@@ -143,24 +143,24 @@ def test_properties_are_verified_and_the_opening_names_the_model_that_classifies
         assert bool(ours.loc[f"equivariant under {exact}", "holds"])
     page = (finished.results / "report" / "index.html").read_text(encoding="utf-8")
     opening = page[page.index('id="overview"') :].partition("</section>")[0]
-    for said in (
+    for entry in (
         "scenenet, a SCENE-Net with 11 parameters",
         "classifies the new surveys",
         "cnn, a convolutional network",
         "boosted trees, gradient boosted decision trees",
     ):
-        assert said in opening
+        assert entry in opening
 
 
 @pytest.mark.parametrize("rank", ["best", "median", "worst"])
-def test_figure_5_6_is_a_crop_with_what_each_geneo_answers(finished, rank):
+def test_figure_5_6_is_a_crop_with_the_contribution_of_each_geneo(finished, rank):
     scene = read_json(finished.results / "interactive_crop" / f"{rank}.json")
     assert list(scene["shares"]) == ["cylinder", "arrow", "negative_sphere"]
 
 
 def test_every_study_of_the_thesis_is_in_the_configuration(project_root):
-    told = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
-    assert {study["name"]: study["place"] for study in told} == STUDIES
+    studies = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
+    assert {study["name"]: study["place"] for study in studies} == STUDIES
 
 
 LISTED = {
@@ -184,8 +184,8 @@ ADDED = {"alpha-epsilon": [0.1], "learning-rate": [0.01]}
 
 @pytest.mark.parametrize("name", LISTED)
 def test_a_study_varies_what_the_thesis_lists(project_root, name):
-    told = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
-    (vary,) = [study["vary"] for study in told if study["name"] == name]
+    studies = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
+    (vary,) = [study["vary"] for study in studies if study["name"] == name]
     assert vary.keys() == LISTED[name].keys()
     for setting, listed in LISTED[name].items():
         missing = [value for value in listed if value not in vary[setting]]
@@ -195,8 +195,8 @@ def test_a_study_varies_what_the_thesis_lists(project_root, name):
 
 
 def test_alpha_and_epsilon_make_the_55_combinations_that_the_thesis_counts(project_root):
-    told = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
-    (grid,) = [study["vary"] for study in told if study["name"] == "alpha-epsilon"]
+    studies = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
+    (grid,) = [study["vary"] for study in studies if study["name"] == "alpha-epsilon"]
     assert [len(values) for values in grid.values()] == [11, 5]
 
 

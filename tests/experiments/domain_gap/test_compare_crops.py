@@ -31,7 +31,7 @@ def measured():
     return [measure(synthetic_crops(SyntheticSettings(**SPARSE, **kind))) for kind in kinds]
 
 
-def test_crops_are_made_by_the_stages_of_a_survey(measured):
+def test_crops_are_cut_by_the_stages_of_a_survey(measured):
     for some in measured:
         assert len(some.properties) == len(some.grids) == SPARSE["towers"]
         assert len(some.voxels) == len(some.crop)
@@ -50,7 +50,7 @@ def test_similar_crops_are_not_separable_and_different_ones_are(measured):
     assert {"canopy_cover", "tall_density", "class_12"} & set(test.features.index[:8])
 
 
-def test_the_table_says_what_is_in_range(measured):
+def test_the_table_shows_which_properties_are_in_range(measured):
     first, _, bare = measured
     table = compare_properties(first.properties, bare.properties).set_index("property")
     assert table.loc["tower_height", "within"]

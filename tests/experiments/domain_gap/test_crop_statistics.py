@@ -81,7 +81,7 @@ def test_a_property_has_the_value_that_was_built_in(built, name, value, within):
     assert crop_statistics(built)[name] == pytest.approx(value, abs=within + 1e-9)
 
 
-def test_what_is_not_there_has_no_number(built):
+def test_absent_objects_have_no_value(built):
     ground = built.classification == 10
     found = crop_statistics(
         PointCloud(built.xyz[ground], built.classification[ground], built.scheme)

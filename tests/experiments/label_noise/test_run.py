@@ -136,34 +136,34 @@ def test_the_verdict_follows_from_the_numbers(f05, wrong, nearer, ignores):
     assert any(line.startswith("b: F0.5 0.90") for line in findings(table))
 
 
-def test_without_a_scenenet_or_noise_nothing_is_claimed():
+def test_without_a_scenenet_or_noise_there_is_no_verdict():
     table = summarise_label_noise(runs({"b": (0.9, 0.9, 0.9)}))
     assert "not tested" in claim(table, {"b": "cnn"})
     assert "not tested" in claim(table[table["level"] == 0], {"b": "scenenet"})
 
 
 def test_contenders_are_models_of_the_configuration_with_changes(models):
-    told = (
+    entries = (
         Contender(model="cnn", changes={"training.epochs": 9}, name="long"),
         Contender(model="cnn"),
     )
-    long, plain = contenders(told, models, "label_noise")
+    long, plain = contenders(entries, models, "label_noise")
     assert (long.name, long.training.epochs) == ("long", 9)
     assert plain == models[2]
     assert contenders((), models, "label_noise") == models
 
 
 @pytest.mark.parametrize(
-    ("told", "named"),
+    ("entries", "named"),
     [
         ([{"model": "cn"}], "'cn' is not one of"),
         ([{"model": "cnn", "changes": {"training.epoch": 3}}], "epoch"),
         ([{"model": "cnn"}, {"model": "cnn"}], "cnn is listed more than once"),
     ],
 )
-def test_invalid_contenders_are_named(models: list[ModelSettings], told, named):
+def test_invalid_contenders_are_named(models: list[ModelSettings], entries, named):
     with pytest.raises(ValueError, match=named):
-        contenders([Contender(**one) for one in told], models, "label_noise")
+        contenders([Contender(**one) for one in entries], models, "label_noise")
 
 
 @pytest.mark.parametrize(

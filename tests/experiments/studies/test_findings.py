@@ -34,7 +34,7 @@ def test_best_lowest_and_equal_variants():
     )
 
 
-def test_one_seed_tells_nothing_of_spread():
+def test_one_seed_has_no_spread_in_the_findings():
     frame = summary({"a": (0.4, float("nan"), 1, 0), "b": (0.5, float("nan"), 1, 0)}, 1)
     text = findings(study(1), frame)
     assert "b with F0.5 0.50. Lowest" in text
@@ -49,7 +49,7 @@ def test_variants_with_dead_models_are_named_with_their_number():
     assert "Dead models: 9 of 10." in findings(study(), summary(many))
 
 
-def test_nothing_found_is_not_a_best():
+def test_a_study_without_detections_has_no_best_variant():
     frame = summary({"a": (0.0, 0.0, 0, 0), "b": (0.0, 0.0, 0, 0)})
     assert findings(study(), frame) == "No variant detects a tower voxel."
 

@@ -27,8 +27,8 @@ SPLIT = SplitSettings(train=0.4, validation=0.2, test=0.4, stretch=1, neighbour=
 
 
 def study(**fields) -> StudySettings:
-    told = {"name": "s", "title": "t", "place": "5", "asks": "?", "seeds": (0, 1)}
-    return StudySettings(**(told | fields))
+    defined = {"name": "s", "title": "t", "place": "5", "asks": "?", "seeds": (0, 1)}
+    return StudySettings(**(defined | fields))
 
 
 @pytest.fixture(scope="module")
@@ -56,8 +56,8 @@ def test_every_combination_is_a_variant():
     assert all(plan.model.training.epochs == 2 for plan in plans)
 
 
-def test_changes_go_where_they_belong_and_common_ones_to_all():
-    told = study(
+def test_changes_apply_to_their_variant_and_common_ones_to_all():
+    defined = study(
         common={"training.epochs": 7},
         variants=[
             {
@@ -67,7 +67,7 @@ def test_changes_go_where_they_belong_and_common_ones_to_all():
             {"name": "b", "changes": {"applied.kernel_size": [9, 3, 3], "applied.resolution": 128}},
         ],
     )
-    a, b = told.plans(MODEL, GRID, SPLIT)
+    a, b = defined.plans(MODEL, GRID, SPLIT)
     assert (a.model.training.epochs, b.model.training.epochs) == (7, 7)
     assert (a.voxels.resolution, a.applied_voxels.resolution, a.split.train) == (64, 64, 0.2)
     assert (b.voxels.resolution, b.applied_voxels.resolution) == (32, 128)
@@ -85,45 +85,47 @@ def test_changes_go_where_they_belong_and_common_ones_to_all():
         ({"kind": "cnn", "training.init": "unranged"}, "a CNN has no parameter ranges"),
     ],
 )
-def test_a_change_that_cannot_be_is_named(changes, named):
+def test_an_invalid_change_is_named(changes, named):
     with pytest.raises(ValueError, match=named):
         study(variants=[{"name": "wrong", "changes": changes}]).plans(MODEL, GRID, SPLIT)
 
 
-def test_a_reference_may_stand_before_the_combinations():
-    told = study(
+def test_a_reference_variant_may_precede_the_combinations():
+    defined = study(
         variants=[{"name": "none"}],
         vary={"training.decay": (0.05, 0.25), "training.decay_every": (10, 20)},
     )
-    plans = told.plans(MODEL, GRID, SPLIT)
+    plans = defined.plans(MODEL, GRID, SPLIT)
     assert [plan.name for plan in plans] == [
         "none", "decay 0.05, decay_every 10", "decay 0.05, decay_every 20",
         "decay 0.25, decay_every 10", "decay 0.25, decay_every 20",
     ]  # fmt: skip
     assert [plan.model.training.decay for plan in plans] == [0.0, 0.05, 0.05, 0.25, 0.25]
-    assert not told.is_grid
-    assert study(vary=told.vary).is_grid
+    assert not defined.is_grid
+    assert study(vary=defined.vary).is_grid
 
 
 def test_small_numbers_are_written_out():
-    told = study(vary={"training.loss.epsilon": (0.00001, 0.1), "training.loss.alpha": (5, 0.001)})
-    names = [variant.name for variant in told.all_variants()]
+    defined = study(
+        vary={"training.loss.epsilon": (0.00001, 0.1), "training.loss.alpha": (5, 0.001)}
+    )
+    names = [variant.name for variant in defined.all_variants()]
     assert names[:2] == ["epsilon 0.00001, alpha 5", "epsilon 0.00001, alpha 0.001"]
 
 
 def test_another_architecture_or_protocol_is_a_change_as_any_other():
-    told = study(
+    defined = study(
         variants=[
             {"name": "cnn", "changes": {"kind": "cnn", "training.init": "informed"}},
             {"name": "metres", "changes": {"protocol": "operational", "search.searches": 1}},
         ]
     )
-    cnn, metres = (plan.model for plan in told.plans(MODEL, GRID, SPLIT))
+    cnn, metres = (plan.model for plan in defined.plans(MODEL, GRID, SPLIT))
     assert (cnn.kind, cnn.training.init, cnn.training.epochs) == ("cnn", "informed", 2)
     assert (metres.kind, metres.protocol, metres.search.searches) == ("scenenet", "operational", 1)
 
 
-def test_without_variants_there_is_nothing_to_do():
+def test_a_study_without_variants_is_refused():
     with pytest.raises(ValueError, match="give variants, or vary, or both"):
         study()
     with pytest.raises(ValueError, match="more than once"):
@@ -134,21 +136,21 @@ def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
     trained = []
     original = run.fit
     monkeypatch.setattr(run, "fit", lambda *a: trained.append(a) or original(*a))
-    told = study(
+    defined = study(
         variants=[
             {"name": "as trained"},
             {"name": "smaller", "changes": {"applied.kernel_size": [5, 3, 3]}},
             {"name": "cylinder", "changes": {"geneos": ["cylinder"]}},
         ]
     )
-    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    table = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
     assert len(table) == 6
     assert len(trained) == 4  # the smaller kernels are sampled from the same trainings
     assert list(table["parameters"]) == [11, 11, 11, 11, 2, 2]
     read = pd.read_csv(tmp_path / "runs.csv")
     assert tuple(read.columns) == COLUMNS
     scores = table.set_index(["variant", "seed"])[["precision", "recall", "f05", "tau", "loss"]]
-    again = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "again.csv")
+    again = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "again.csv")
     pd.testing.assert_frame_equal(
         scores, again.set_index(["variant", "seed"])[list(scores)], check_exact=True
     )
@@ -157,7 +159,7 @@ def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
 
 
 def test_models_of_other_kinds_are_trained_and_scored_too(crops, tmp_path):
-    told = study(
+    defined = study(
         seeds=(0,),
         variants=[
             {"name": "ranges"},
@@ -172,7 +174,7 @@ def test_models_of_other_kinds_are_trained_and_scored_too(crops, tmp_path):
             },
         ],
     )  # fmt: skip
-    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    table = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
     rows = {row["variant"]: row for row in table.to_dict("records")}
     assert {name: row["kind"] for name, row in rows.items()} == {
         "ranges": "scenenet", "none": "scenenet", "cnn": "cnn", "metres": "scenenet",
@@ -188,10 +190,10 @@ def test_models_of_other_kinds_are_trained_and_scored_too(crops, tmp_path):
     assert min(rows["metres"]["lowest_weight"], rows["metres"]["lowest_shape"]) > 0
 
 
-def test_a_training_that_loses_its_way_is_a_dead_one_and_the_others_go_on(crops, tmp_path):
+def test_a_diverged_training_counts_as_dead_and_the_others_continue(crops, tmp_path):
     lost = {"training.learning_rate": 1e30, "training.optimiser": "sgd", "training.epochs": 4}
-    told = study(variants=[{"name": "lost", "changes": lost}, {"name": "kept"}])
-    table = run_study(crops, told, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    defined = study(variants=[{"name": "lost", "changes": lost}, {"name": "kept"}])
+    table = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
     gone = table[table["variant"] == "lost"]
     assert len(table) == 4
     assert gone["loss"].isna().all()
@@ -200,12 +202,12 @@ def test_a_training_that_loses_its_way_is_a_dead_one_and_the_others_go_on(crops,
     assert gone["miou"].between(0.49, 0.5).all()
     assert (gone["parameters"] == 11).all()
     assert table.loc[table["variant"] == "kept", "loss"].notna().all()
-    lost_row, _ = summarise(told, table, Thesis(source="s", numbers={})).to_dict("records")
+    lost_row, _ = summarise(defined, table, Thesis(source="s", numbers={})).to_dict("records")
     assert (lost_row["alive"], lost_row["f05"]) == (0, 0.0)
 
 
 def test_the_summary_is_over_seeds_with_the_scores_of_the_thesis():
-    told = study(variants=[{"name": "a", "thesis": "ablation.a"}, {"name": "b"}])
+    defined = study(variants=[{"name": "a", "thesis": "ablation.a"}, {"name": "b"}])
     runs = pd.DataFrame(
         [
             {"variant": v, "seed": s, "alive": f > 0, "f05": f}
@@ -216,7 +218,7 @@ def test_the_summary_is_over_seeds_with_the_scores_of_the_thesis():
         runs[name] = 1.0
     number = {"value": 0.5, "place": "Table 5.5"}
     thesis = Thesis(source="s", numbers={"ablation.a.precision": number})
-    a, b = summarise(told, runs, thesis).to_dict("records")
+    a, b = summarise(defined, runs, thesis).to_dict("records")
     assert a["f05"] == pytest.approx(0.3)
     assert a["f05_std"] == pytest.approx(0.141421, abs=1e-6)
     assert (a["live_share"], b["live_share"]) == (1.0, 0.5)
@@ -226,7 +228,7 @@ def test_the_summary_is_over_seeds_with_the_scores_of_the_thesis():
 
 
 def test_negative_numbers_are_counted_by_seed():
-    told = study(variants=[{"name": name} for name in ("a", "b", "cnn")], seeds=(0, 1, 2, 3))
+    defined = study(variants=[{"name": name} for name in ("a", "b", "cnn")], seeds=(0, 1, 2, 3))
     lowest = {
         "a": ([0.1, -0.1, 0.2, 0.3], [0.5, 0.5, 0.5, -0.2]),  # by weight, by shape
         "b": ([0.1, 0.1, 0.2, 0.3], [0.5, 0.4, 0.0, 0.2]),
@@ -241,7 +243,7 @@ def test_negative_numbers_are_counted_by_seed():
             for s in range(4)
         ]
     )
-    a, b, cnn = summarise(told, runs, Thesis(source="s", numbers={})).to_dict("records")
+    a, b, cnn = summarise(defined, runs, Thesis(source="s", numbers={})).to_dict("records")
     assert (a["negative_share"], b["negative_share"]) == (0.5, 0.0)
     assert (a["lowest_weight"], a["lowest_shape"]) == (-0.1, -0.2)
     assert pd.isna(cnn["negative_share"])

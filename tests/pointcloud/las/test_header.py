@@ -45,13 +45,13 @@ def test_a_billion_claimed_records_cost_no_time(make_las, patched):
     assert time.perf_counter() - start < 2
 
 
-def test_one_record_too_many_is_told_and_the_points_are_read(make_las, patched):
+def test_one_record_too_many_is_reported_and_the_points_are_read(make_las, patched):
     path = patched(make_las(n=50, crs="EPSG:32629"), {100: struct.pack("<I", 2)})
     assert len(read(path)) == 50
     assert any("claims 2 variable" in warning for warning in survey_info(path).warnings)
 
 
-def test_extended_records_that_do_not_fit_are_told_and_not_followed(make_las, patched):
+def test_extended_records_that_do_not_fit_are_reported_and_not_read(make_las, patched):
     path = patched(make_las(n=5), {235: struct.pack("<QI", 400, 4_000_000_000)})
     assert any("4000000000" in warning for warning in survey_info(path).warnings)
     assert len(read(path)) == 5
@@ -77,7 +77,7 @@ def test_a_header_that_contradicts_itself_is_refused(make_las, patched, at, word
     refused(patched(make_las(), at), word)
 
 
-def test_points_that_the_header_denies_are_not_lost_without_a_word(make_las, patched):
+def test_points_that_the_header_omits_are_reported(make_las, patched):
     path = make_las(version="1.2", point_format=0, n=60)
     refused(patched(path, {107: struct.pack("<I", 0)}), "0 points", "did not finish")
     info = survey_info(patched(path, {107: struct.pack("<I", 40)}))

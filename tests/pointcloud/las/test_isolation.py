@@ -40,20 +40,20 @@ def test_a_decoder_that_hangs_is_stopped_and_the_file_named(laz):
     assert str(laz) in str(caught.value)
 
 
-def test_a_decoder_that_is_killed_is_told_by_its_signal(laz):
+def test_a_killed_decoder_is_reported_with_its_signal(laz):
     script = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
     with pytest.raises(InputError, match="SIGKILL") as caught:
         decode(laz, script)
     assert str(laz) in str(caught.value)
 
 
-def test_a_decoder_that_aborts_is_told_with_its_last_words(laz):
+def test_an_aborted_decoder_is_reported_with_its_last_output(laz):
     script = "import os, sys; print('out of memory', file=sys.stderr, flush=True); os.abort()"
     with pytest.raises(InputError, match=r"SIGABRT.*out of memory"):
         decode(laz, script)
 
 
-def test_a_decoder_that_stops_half_way_is_not_taken_for_the_end(laz):
+def test_a_decoder_that_stops_half_way_is_an_error(laz):
     script = (
         "import sys, struct; o = sys.stdout.buffer;"
         "o.write(struct.pack('<cI', b'P', 10) + bytes(300)); o.write(struct.pack('<cI', b'D', 0))"
@@ -62,7 +62,7 @@ def test_a_decoder_that_stops_half_way_is_not_taken_for_the_end(laz):
         decode(laz, script)
 
 
-def test_a_decoder_that_sends_more_points_than_the_header_has_is_not_believed(laz):
+def test_a_decoder_that_sends_more_points_than_the_header_has_is_an_error(laz):
     script = "import sys, struct; sys.stdout.buffer.write(struct.pack('<cI', b'P', 4000000000))"
     with pytest.raises(InputError, match="other than points"):
         decode(laz, script)
@@ -80,7 +80,7 @@ def test_damage_in_the_compressed_points_is_an_error_or_points_but_never_a_crash
             assert sum(map(len, pieces)) == 1000
 
 
-def test_a_panic_of_the_decoder_comes_back_as_a_refusal(make_las, patched):
+def test_a_panic_of_the_decoder_becomes_an_error(make_las, patched):
     # Without chunks, of 0 points each: what LASzip 1.2 wrote, and lazrs panics about.
     laz = make_las("survey.laz", version="1.2", point_format=1, n=1000)
     at = laz.read_bytes().index(b"laszip encoded") - 2 + 54
@@ -106,7 +106,7 @@ def test_no_worker_is_left_when_the_reader_stops_early(make_las):
     assert worker.poll() is not None
 
 
-def test_a_worker_dies_when_its_parent_is_gone(make_las):
+def test_a_worker_ends_when_its_parent_ends(make_las):
     path = make_las("survey.laz", n=600_000)
     parent = (
         "import sys, os, signal\n"

@@ -90,7 +90,7 @@ def test_each_oddity_has_its_warning(grid_survey, patched):
     assert warned(box, "edp", "600 points outside the bounding box")
 
 
-def test_degrees_are_told_and_give_no_density(tmp_path):
+def test_degrees_are_reported_and_give_no_density(tmp_path):
     path = tmp_path / "degrees.las"
     xyz = np.column_stack([np.linspace(-8.1, -8.0, 200), np.linspace(41, 41.1, 200), np.ones(200)])
     write_las(path, PointCloud(xyz, np.full(200, 2, np.uint8)), scale=1e-7)
@@ -135,7 +135,7 @@ def test_a_folder_without_samples_is_refused(tmp_path):
         check_survey(tmp_path, "edp")
 
 
-def test_merged_classes_of_a_ts40k_sample_taken_for_edp_are_warned_of(tmp_path):
+def test_merged_classes_of_a_ts40k_sample_read_as_edp_give_a_warning(tmp_path):
     path = tmp_path / "sample.pt"
     codes = torch.tensor([1, 4, 5, 2])
     torch.save({"input_pcd": torch.rand(4, 3), "semantic_labels": codes}, path)

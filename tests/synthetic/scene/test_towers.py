@@ -12,7 +12,7 @@ KINDS_AND_CIRCUITS = [(kind, circuits) for kind in KINDS for circuits in (1, 2)]
 
 
 @pytest.mark.parametrize(("kind", "circuits"), KINDS_AND_CIRCUITS)
-def test_tower_is_as_high_as_asked_and_stands_on_its_foot(kind, circuits):
+def test_a_tower_has_the_requested_height_and_stands_on_its_foot(kind, circuits):
     tower = KINDS[kind](18.0, circuits, 1)
     ends = tower.members[:, :6].reshape(-1, 3)
     assert ends[:, 2].max() == pytest.approx(18.0, abs=0.25)
@@ -21,7 +21,7 @@ def test_tower_is_as_high_as_asked_and_stands_on_its_foot(kind, circuits):
 
 @pytest.mark.parametrize(("kind", "circuits"), KINDS_AND_CIRCUITS)
 @pytest.mark.parametrize("earth_wires", [0, 1])
-def test_every_wire_has_its_place_on_the_tower(kind, circuits, earth_wires):
+def test_every_conductor_is_attached_to_the_tower(kind, circuits, earth_wires):
     tower = KINDS[kind](18.0, circuits, earth_wires)
     assert tower.attachments.shape == (3 * circuits + earth_wires, 3)
     ends = tower.members[:, :6].reshape(-1, 3)
@@ -61,7 +61,7 @@ def test_arms_stand_across_the_line():
 
 
 @pytest.mark.parametrize("rise", [-20.0, 0.0, 35.0])
-def test_wire_ends_where_it_is_held_and_hangs_below_the_chord(rise):
+def test_a_conductor_ends_at_its_attachments_and_hangs_below_the_chord(rise):
     start, end = np.array([5.0, 5.0, 40.0]), np.array([95.0, 125.0, 40.0 + rise])
     u = np.linspace(0, 1, 101)
     wire = catenary(start, end, 1000.0, u)
@@ -71,7 +71,7 @@ def test_wire_ends_where_it_is_held_and_hangs_below_the_chord(rise):
     assert below.max() == pytest.approx(150**2 / (8 * 1000), rel=0.05)
 
 
-def test_scan_lines_meet_wires_and_only_the_scanned_part():
+def test_scan_lines_meet_conductors_in_the_scanned_part_only():
     starts, ends = np.array([[0, -1, 10], [0, 1, 10.0]]), np.array([[100, -1, 10], [100, 1, 10.0]])
     rng = np.random.default_rng(0)
     points = string_conductors(starts, ends, 900.0, 0.2, 0.8, rng, (0.25, 0.75))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-# Workers that run side by side must not fight for cores, so each has one thread. Libraries read
+# Parallel workers must not compete for cores, so each has one thread. Libraries read
 # this when they are loaded.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -58,7 +58,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log):
 
 
 PLACE = np.array([500_000.0, 4_630_000.0, 100.0])
-"""Where the small scenes lie, m: far from zero, as surveys do, where float32 has lost the metre."""
+"""Origin of the small scenes, m: far from zero like surveys, so that float32 cannot resolve metres."""
 GROUND, TREE, TOWER = 2, 4, 15
 SCENE_WIDTH_M = 30.0
 
@@ -76,7 +76,7 @@ POLE_NUMBERS = {
     "lambda.arrow": 0.1,
     "lambda.negative_sphere": 0.8,
 }
-"""Numbers of a SCENE-Net that sees a pole on flat ground in voxels of 1 m."""
+"""Parameters of a SCENE-Net that detects a pole on flat ground in voxels of 1 m."""
 POLE_TAU = 0.7
 
 
@@ -87,7 +87,7 @@ def project_root() -> Path:
 
 @pytest.fixture(scope="session")
 def pictures() -> ModuleType:
-    """``tools/doc_pictures.py``, which opens pages as a reader has them; skips without Chromium."""
+    """``tools/doc_pictures.py``, which opens pages in a browser; skips without Chromium."""
     spec = importlib.util.spec_from_file_location("pictures", ROOT / "tools" / "doc_pictures.py")
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
@@ -98,7 +98,7 @@ def pictures() -> ModuleType:
 
 @pytest.fixture(scope="session")
 def real_data() -> Path:
-    """Folder of real recordings, which are no part of the project; skips where there are none."""
+    """Folder of real recordings, which are not part of the project; skips without them."""
     folder = Path(os.environ.get("SCENENET_REAL_DATA", ROOT.parent / "shared" / "data"))
     if not folder.is_dir():
         pytest.skip("no real recordings here: set SCENENET_REAL_DATA to a folder that has them")
@@ -172,18 +172,18 @@ def real_samples(real_data: Path):
 
 
 class Lattice:
-    """Middles of occupied voxels of 1 m, placed by hand around ``PLACE``; ground from 0 to 1 m."""
+    """Centres of occupied voxels of 1 m, placed by hand around ``PLACE``; ground from 0 to 1 m."""
 
     place = PLACE
 
     @staticmethod
     def voxels(places: np.ndarray) -> np.ndarray:
-        """Those that hold places (M, 3), m from ``PLACE``, each once."""
+        """The distinct voxels of positions (M, 3) m relative to ``PLACE``."""
         return np.unique(np.floor(places), axis=0) + 0.5 + PLACE
 
     @classmethod
     def ground(cls, half: float = 30.0, slope: float = 0.0) -> np.ndarray:
-        """A square of ground that rises by ``slope`` m a metre towards the east."""
+        """A square of ground that rises by ``slope`` m per metre towards the east."""
         x, y = (side.ravel() for side in np.meshgrid(*[np.arange(-half, half)] * 2))
         return cls.voxels(np.column_stack([x, y, slope * x]))
 
@@ -236,7 +236,7 @@ def lattice() -> type[Lattice]:
 
 @dataclass(frozen=True)
 class Chain:
-    """Files of a survey on its way to training: paths of the survey, manifests and split."""
+    """The files of a survey before training: paths of the survey, manifests and split."""
 
     survey: Path
     crops: Path

@@ -1,4 +1,4 @@
-"""Features of voxels, on scenes whose answers one can tell."""
+"""Features of voxels in scenes with known values."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def table(sample: VoxelSample) -> dict[str, np.ndarray]:
 
 
 def nearest(sample: VoxelSample, xyz) -> int:
-    """Row of the occupied voxel whose middle is nearest."""
+    """Row of the occupied voxel with the nearest centre."""
     return int(np.linalg.norm(sample.grid.centres(sample.index) - xyz, axis=1).argmin())
 
 
@@ -94,7 +94,9 @@ def test_ground_has_no_height():
 def test_conductors_are_measured_from_the_pole_and_from_themselves():
     sample = sample_of(flat_ground(), pole(), wire())
     body = at(sample, (20.1, 20.1, 5.5))
-    assert body["conductor_distance"] <= 4  # near the pole the wire's surroundings are no line
+    assert (
+        body["conductor_distance"] <= 4
+    )  # near the pole the surroundings of the conductor are not linear
     assert body["conductor_6"] >= 6
     assert at(sample, (5.5, 20.5, 12.5))["conductor_distance"] == 0
     aside = at(sample, (20.5, 30.5, 0.5))
@@ -202,7 +204,7 @@ MEDIAN_OFF = {
     "tall_6": 0.1,
     "linearity_4": 0.1,
 }
-"""How far apart (m, 1) a voxel's feature and those of its parts, half its size, mostly are."""
+"""Allowed median difference between the feature of a voxel and those of its eight parts."""
 
 
 @pytest.mark.parametrize("name", ["sample_575", "sample_593"])

@@ -1,4 +1,4 @@
-"""The benchmark compares ways to the same result, and says what it found as its users expect."""
+"""The alternative implementations of the benchmark agree, and its result is complete."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_both_voxelisations_find_the_same_voxels(crops):
     grid = VoxelSettings(resolution=32).grid(crops[0].xyz)
     sample = voxelise(crops[0], grid)
     counts, truth = peers.pandas_voxels(crops[0], grid)
-    # A point on the border of two voxels may fall to either, by rounding.
+    # A point on the border of two voxels may belong to either one, by rounding.
     assert abs(np.count_nonzero(counts) - len(sample.index)) <= 3
     assert abs(np.count_nonzero(truth) - int(sample.tower.sum())) <= 1
     assert set(np.flatnonzero(truth)) >= set(sample.tower_index()[:-1])

@@ -40,7 +40,7 @@ def survey(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def model(survey, tmp_path_factory) -> Path:
-    """A model trained on it for a moment, and what was answered on the way."""
+    """A model trained on it for a moment, and the output of the command."""
     out = tmp_path_factory.mktemp("model") / "model.json"
     made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
                     "--seeds", 2, "--json")  # fmt: skip
@@ -75,7 +75,7 @@ def test_the_help_of_every_command_has_an_example(command):
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_example_is_a_valid_call(command):
-    """Its options exist: the call fails because of its files, if at all, and not with code 2."""
+    """The options exist: a call may fail because of its files, but not with code 2."""
     group = typer.main.get_command(app)
     for example in COMMANDS[command].EXAMPLES:
         arguments = shlex.split(example.partition(" >")[0])

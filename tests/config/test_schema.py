@@ -1,4 +1,4 @@
-"""A configuration says what is wrong with it, and its schema is that of the models."""
+"""Errors in a configuration are explained, and the schema follows from the settings."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_the_shipped_configurations_write_to_different_folders_and_names(project
     configs = [load(shipped(project_root, n)) for n in ("config.yaml", "test.yaml", "ts40k.yaml")]
     assert len({config.results_dir for config in configs}) == 3
     assert len({config.dataset for config in configs}) == 3
-    # One store for all of them: with different settings, each would want it made anew.
+    # All share one store; with different settings each would create it again.
     assert len({config.tracking for config in configs}) == 1
 
 

@@ -55,7 +55,7 @@ def test_columns_may_come_in_any_order_among_comments_and_empty_lines(root):
 
 
 def test_a_sheet_saved_by_a_spreadsheet_is_read(root):
-    """It begins with a byte order mark and ends its lines with carriage returns."""
+    """It starts with a byte order mark and has carriage returns."""
     assert read(root, "north\tdata/north.laz\tedp\ttrain\r", header=f"﻿{HEADER}\r")
 
 
@@ -117,7 +117,7 @@ def test_every_class_scheme_is_accepted_in_the_sheet(root):
 
 
 def test_a_training_file_with_two_names_is_refused(root):
-    """Its crops would be among those to train on and those to test on."""
+    """Its crops would be in the training part and in the test part."""
     rows = ["a\tdata/north.laz\tedp\ttrain", "b\tdata/../data/north.laz\tedp\ttrain"]
     assert "line 3: the file" in complaint(root, *rows)
     rows[1] = rows[1].replace("train", "new")

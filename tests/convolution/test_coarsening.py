@@ -1,4 +1,4 @@
-"""A fine grid seen through blocks."""
+"""A fine grid observed in blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The occupancy convolution is the dense one, and moves with the scene."""
+"""The convolution over occupied voxels equals the dense one and is equivariant."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scenenet.convolution.convolve import convolve, convolve_at_voxels
 from scenenet.convolution.occupancy import Occupancy
 
-# torch says that an even size costs it a copy.
+# torch warns that an even size needs a copy.
 pytestmark = pytest.mark.filterwarnings("ignore:Using padding='same'")
 
 # Wide enough for runs of voxels that end within a row and at its end, and kernels that need more
@@ -111,7 +111,7 @@ def test_one_voxel_spreads_the_mirrored_kernel_around_itself():
 def test_an_even_kernel_extends_one_voxel_further_up():
     kernel = torch.tensor([1.0, 10.0]).reshape(1, 1, 2)
     one = Occupancy.of_grids([np.array([2])], [np.ones(1)], (1, 1, 5))
-    # out[p] = kernel[0] x[p] + kernel[1] x[p + 1]: no answer between two voxels
+    # out[p] = kernel[0] x[p] + kernel[1] x[p + 1]: no response between two voxels
     assert convolve(one, kernel).tolist() == [[[[0.0, 10.0, 1.0, 0.0, 0.0]]]]
 
 

@@ -1,4 +1,4 @@
-"""The strongest answer in a section of a tower."""
+"""The strongest response in the cross-section of a tower."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""tanh, ReLU, error and counts, taken plane by plane, are those of the whole volume."""
+"""tanh, ReLU, error and counts plane by plane are those of the whole volume."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_counts_at_every_threshold(shape, size, bias, share, scale, seed):
 
 def test_the_error_of_a_single_precision_probability_is_rounding():
     answers = np.concatenate([np.linspace(0, 12, 50_001), np.logspace(-30, 1, 5_001), [-1.0, -50]])
-    # One voxel at a time: a kernel of one element makes the answer whatever it holds.
+    # One voxel at a time: a kernel of one element gives any response.
     indices = [np.arange(len(answers))]
     line = Occupancy.of_grids(indices, [answers.astype(np.float32)], (1, 1, len(answers)))
     got = observe(line, torch.ones(1, 1, 1)).numpy().reshape(-1)

@@ -1,4 +1,4 @@
-"""The code behind a result counts by what it does, wherever it is in the package."""
+"""The hash of code depends on what the code does, wherever it is in the package."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Package:
         return file
 
     def used(self, *scripts: Path) -> set[str]:
-        """Names of what the scripts use, without those of the scripts and the package."""
+        """Names of the modules that the scripts use, without the scripts and the package."""
         self.forget()
         used = {name for name, _ in codehash.used_code(scripts, self.name)}
         return {n.removeprefix(f"{self.name}.") for n in used} - {s.name for s in scripts}

@@ -1,4 +1,4 @@
-"""The one error that users see says where, what and what to do."""
+"""The error for users names the place, the problem and the remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Inputs are identified by their content, and a result records what made it."""
+"""Inputs are identified by their content, and a result records its provenance."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def test_a_crop_has_every_point_within_one_tower_height_and_no_other(field, tmp_
     _, [(crop, cropped)] = cut(path, table((30, 20, 10.0)), tmp_path)
     apart = np.linalg.norm(cloud.xyz[:, :2] - PLACE, axis=1)
     expected = cloud.select(apart <= 10.0)
-    assert len(expected) == 317  # places of a square lattice within a circle of radius 10
+    assert len(expected) == 317  # points of a square lattice within a circle of radius 10
     np.testing.assert_allclose(cropped.xyz, expected.xyz, atol=1e-6)
     np.testing.assert_array_equal(cropped.classification, expected.classification)
     assert crop.id == "field-0001"

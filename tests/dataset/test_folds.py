@@ -1,4 +1,4 @@
-"""Folds are fixed, leave out every crop once, and never train on a neighbour of one left out."""
+"""Folds are fixed, leave out every crop once, and never train on its neighbours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Labelled towers: instances and their measures."""
+"""Labelled towers: instances and their properties."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands on an axis, measured in voxels placed by hand."""
+"""The body on an axis, measured in voxels placed by hand."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def stand(lattice, around, seen=(5.5, 14.5), at=AXIS, foot_radius=5.0):
 
 
 def lattice_tower(lattice, height: float, spread: float):
-    """Four legs that lean together from ``spread`` m off the axis to the top."""
+    """Four legs that start ``spread`` m from the axis and meet at the top."""
     z = np.arange(1, height)
     off = spread * (1 - z / height)
     corners = [
@@ -88,7 +88,7 @@ def test_conductors_and_crossarms_do_not_widen_a_body(lattice):
     axis, width, free = centre_body(around, AXIS + lattice.place[:2], stand(lattice, around), 1.0)
     assert np.abs(axis - AXIS - lattice.place[:2]).max() < 0.1
     assert width == pytest.approx(1.0)
-    assert 0.8 < free < 1  # not where the wires are
+    assert 0.8 < free < 1  # not where the conductors are
 
 
 def test_a_body_that_is_touched_everywhere_has_no_width(lattice):

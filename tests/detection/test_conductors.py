@@ -1,4 +1,4 @@
-"""Wires are told from treetops, roofs and booms, in voxels placed by hand."""
+"""Conductors are distinguished from treetops, roofs and booms, in voxels placed by hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ HEIGHT = 15.0
 
 
 def spans(lattice, *parts, height=HEIGHT, crossarm=4.0, x=0.5, y=0.5):
-    """What leaves a pole of ``HEIGHT`` m amid flat ground besides which ``parts`` stand."""
+    """Spans that leave a pole of ``HEIGHT`` m on flat ground with ``parts`` around it."""
     everything = lattice.together(lattice.column(0, 0, 0, height), *parts)
     axis = (lattice.place[0] + x, lattice.place[1] + y)
     return leaving_spans(everything, axis, lattice.place[2], height, crossarm, 1.0)

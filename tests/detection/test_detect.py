@@ -17,7 +17,7 @@ TAU = 0.5
 
 @pytest.fixture(scope="module")
 def pole(lattice):
-    """A function that makes a pole with wires towards two sides: (all its voxels, its body)."""
+    """A function that makes a pole with conductors to two sides: (all its voxels, its body)."""
 
     def make(x=0.0, y=0.0, height=15, bearings=(80, 260)):
         body = lattice.column(x, y, 0, height)
@@ -137,7 +137,11 @@ def test_each_tower_of_a_line_is_detected_once(lattice, pole):
     around = lattice.together(lattice.ground(90), *(a for a, _ in parts))
     detected = np.concatenate([upper(b) for _, b in parts])
     towers = detect(detected, around, np.repeat([0.5, 0.9, 0.7], 10))
-    assert [round(t.x - lattice.place[0] - 0.5) for t in towers] == [0, 60, -60]  # surest first
+    assert [round(t.x - lattice.place[0] - 0.5) for t in towers] == [
+        0,
+        60,
+        -60,
+    ]  # highest probability first
     assert [t.voxels.tolist() for t in towers] == [
         list(range(10, 20)), list(range(20, 30)), list(range(10))
     ]  # fmt: skip
@@ -234,7 +238,7 @@ def test_the_body_of_a_wide_tower_reaches_further(lattice, pole, width, reach):
 
 
 def test_of_two_axes_of_a_tower_the_free_standing_one_is_kept(lattice, pole):
-    """A taller one that everything touches was found from afar, through a neighbouring tree."""
+    """The other axis is taller, but a neighbouring tree touches it at all levels."""
     from scenenet.detection import detect as detection
 
     around, body = pole()

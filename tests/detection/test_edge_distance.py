@@ -1,4 +1,4 @@
-"""How far a place is from where the data end."""
+"""Distance of a position from the edge of the data."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ REACH = 80.0
 
 
 def field(keep) -> np.ndarray:
-    """A point a metre around ``PLACE``, where ``keep`` says so of the offset (x, y)."""
+    """One point per m^2 around ``PLACE``, where ``keep`` accepts the offset (x, y)."""
     x, y = np.meshgrid(np.arange(-REACH, REACH) + 0.5, np.arange(-REACH, REACH) + 0.5)
     return np.column_stack([x.ravel(), y.ravel()])[keep(x, y).ravel()] + PLACE
 

@@ -1,4 +1,4 @@
-"""What the documentation shows works, and what it names exists."""
+"""Examples in the documentation work, and everything it names exists."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from scenenet.models.settings import ModelSettings
 from scenenet.synthetic.settings import SyntheticSettings
 
 GENERATED = {"docs/reference/cli.md", "docs/reference/settings.md"}
-"""Pages that ``tools/doc_site.py`` makes when the site is built."""
+"""Pages that ``tools/doc_site.py`` generates when the site is built."""
 SNAKEMAKE = {"set-resources"}
 """Settings of a Snakemake profile in an example."""
 CODE = ("scenenet", "workflow", "config", "tests", "tools", "Snakefile", "Makefile")

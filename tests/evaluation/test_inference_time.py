@@ -1,4 +1,4 @@
-"""A model is timed on crops of the test part, and a process knows how much memory it had."""
+"""Inference time on crops of the test part, and the peak memory of a process."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scores of a model on crops, with models and crops whose outcome is known."""
+"""Scores of a model on crops, with models and crops of known outcome."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from scenenet.models.settings import MetricSettings, ModelSettings
 SHAPE = (12, 3, 30)
 GRID = VoxelGrid((0.0, 0.0, 0.0), 1.0, SHAPE)
 LONE_POLES = DetectionSettings(min_conductor=0)
-"""For scenes of poles without wires."""
+"""For scenes with poles without conductors."""
 CARD = ModelCard(
     name="mock", codes="edp", measurement="presence", fit="metric", resolution=64, voxel_size=1.0,
     tau=0.5, provenance={"seed": 4},
@@ -32,7 +32,7 @@ CARD = ModelCard(
 
 
 class Mock(VoxelModel):
-    """Answers every crop with the probabilities it was told."""
+    """Predicts given probabilities for every crop."""
 
     kind = "mock"
     kernel_size = (1, 1, 1)
@@ -174,7 +174,7 @@ def test_only_the_selected_part_is_scored(chain, pole_finder, tmp_path):
 
 
 def test_detected_towers_count_whole_and_other_voxels_do_not():
-    """Half of a pole and a low stump reach tau; of the towers, the pole is all that is one."""
+    """Half of a pole and a low stump reach tau; only the pole is a tower."""
     half = pole(5, low=6) | pole(20, low=0, high=2)
     samples, crops = zip(crop(1, 5), strict=True)
     dataset = Dataset(list(samples), list(crops), "edp", [])
@@ -194,7 +194,7 @@ def test_detected_towers_count_whole_and_other_voxels_do_not():
     assert observer.voxel == observer.voxel_observer == towers.voxel_observer
     assert towers.voxel == towers.voxel_towers == observer.voxel_towers
     assert (observer.voxel.recall, observer.voxel.precision) == (6 / 12, 6 / 8)
-    # The voxel on the ground is no part of a body.
+    # The voxel on the ground does not belong to the body.
     assert (towers.voxel.recall, towers.voxel.precision) == (11 / 12, 1.0)
     [sample] = towers.per_sample
     assert (sample.tp, sample.fp, sample.fn) == (11, 0, 1)
@@ -202,7 +202,7 @@ def test_detected_towers_count_whole_and_other_voxels_do_not():
 
 
 def test_towers_are_found_in_voxels_finer_than_the_points_are_dense():
-    """A pole with a point every metre and a quarter, in voxels of a quarter of a metre."""
+    """A pole with a point every 1.25 m, in voxels of 0.25 m."""
     grid = VoxelGrid((0.0, 0.0, 0.0), 0.25, (64, 48, 120))
     ground = [(0, y, x) for y in range(0, 48, 4) for x in range(0, 120, 4)]
     body = [(z, 24, 60) for z in range(5, 62, 5)]

@@ -1,4 +1,4 @@
-"""Each model is trained and tuned as it is elsewhere, and never on what it is scored on."""
+"""Each model is trained and tuned as elsewhere, and never on the crops of its scores."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures show what the result files say, and say it in words as well."""
+"""Pictures show the content of the result files, with an alternative text."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def test_every_voxel_has_a_position_a_class_and_a_share_of_each_kernel(scene):
     tower = decoded(scene["tower"], "<u1")
     classes = decoded(scene["class"], "<u1")
     assert len(decoded(scene["zyx"], "<i2")) == 3 * len(tower)
-    # A voxel that holds a tower point shows the tower, whatever else is in it.
+    # A voxel with a tower point has the class tower, whatever else is in it.
     assert set(classes[tower > 0]) == {CLASSES.index("tower")}
     assert {CLASSES[code] for code in set(classes)} == {"ground", "conductor", "tower"}
     assert list(scene["shares"]) == ["cylinder", "arrow", "negative_sphere"]
@@ -42,7 +42,7 @@ def test_the_counts_are_those_of_the_whole_grid(scene):
     curve = ThresholdCurve(np.array(scene["true"]), np.array(scene["false"]))
     assert curve.true.sum() == decoded(scene["tower"], "<u1").sum()
     assert curve.true.sum() + curve.false.sum() == 32**3
-    # The occupied voxels alone reach no threshold more often than all voxels do.
+    # The counts of all voxels are at least those of the occupied voxels.
     steps, tower = decoded(scene["steps"], "<u2"), decoded(scene["tower"], "<u1") > 0
     np.testing.assert_array_equal(np.bincount(steps[tower], minlength=651), curve.true)
     assert (np.bincount(steps[~tower], minlength=651)[1:] <= curve.false[1:]).all()

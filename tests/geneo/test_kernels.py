@@ -1,4 +1,4 @@
-"""Values of the kernels that one can work out by hand (thesis 4.4)."""
+"""Values of the kernels that can be calculated by hand (thesis 4.4)."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def test_kernels_are_differentiable_in_every_parameter(name, shape, size):
 @pytest.mark.parametrize("name", ["cylinder", "arrow", "negative_sphere"])
 def test_parameters_have_range_unit_and_meaning(name):
     for parameter in kernel_named(name).parameters:
-        assert 0 < parameter.low < parameter.high  # the thesis wants them non-negative
+        assert 0 < parameter.low < parameter.high  # the thesis requires non-negative parameters
         assert parameter.unit in {"voxel", "voxel^2", "1"}
         assert parameter.meaning
 
@@ -189,7 +189,7 @@ def test_a_shell_without_thickness_is_finite_and_has_zero_slope(sigma, radius):
     width = torch.tensor(sigma, requires_grad=True)
     r = torch.tensor(radius, requires_grad=True)
     shell = gaussian_shell(distance, r**2, width)
-    # What is left of it: the places at exactly its radius.
+    # Only positions exactly at its radius are left.
     assert shell.tolist() == (distance == r.detach() ** 2).float().tolist()
     for slope in torch.autograd.grad(shell.sum(), [width, r]):
         assert slope.item() == 0.0

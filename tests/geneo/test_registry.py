@@ -1,4 +1,4 @@
-"""A new kernel is one file, and nothing else has to know of it."""
+"""A new kernel needs one file and no other change."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def own_registry(monkeypatch):
 
 @pytest.fixture
 def disc(own_registry, monkeypatch, tmp_path):
-    """A file with a kernel, put where the kernels are looked for."""
+    """A file with a kernel in the folder of the kernels."""
     (tmp_path / "disc.py").write_text(DISC)
     monkeypatch.setattr(kernels_package, "__path__", [*kernels_package.__path__, str(tmp_path)])
     registry._discover.cache_clear()

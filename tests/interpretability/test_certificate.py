@@ -1,4 +1,4 @@
-"""The certificate of a model file says in words and numbers what the model keeps."""
+"""The certificate of a model file has its properties in words and numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The certificate of models whose properties are known beforehand (thesis 3.4, 4.3 to 4.5)."""
+"""The certificate of models with known properties (thesis 3.4, 4.3 to 4.5)."""
 
 from __future__ import annotations
 

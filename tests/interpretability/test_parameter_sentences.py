@@ -1,4 +1,4 @@
-"""Each number of a SCENE-Net is read out in metres, by the formulas of its kernel."""
+"""Each number of a SCENE-Net is described in metres, by the formulas of its kernel."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def test_repeated_kernels_are_described_by_their_own_numbers():
 
 
 def test_names_of_tables_and_pictures_need_no_torch():
-    """The workflow asks for them whenever it is planned."""
+    """The workflow needs them for every plan."""
     asked = "import sys, scenenet.results.tables, scenenet.figures, scenenet.results.folder"
     heavy = "print([name for name in ('torch', 'matplotlib', 'numba') if name in sys.modules])"
     done = subprocess.run(

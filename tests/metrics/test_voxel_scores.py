@@ -1,4 +1,4 @@
-"""Scores on predictions whose outcome is known beforehand."""
+"""Scores of predictions with known outcome."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Model files: read back as written, readable by a person, refused when something else."""
+"""Model files are read back as written, readable, and refused if invalid."""
 
 from __future__ import annotations
 

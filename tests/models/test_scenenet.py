@@ -1,4 +1,4 @@
-"""SCENE-Net and the CNN: what is stated of them, and how they move with the scene."""
+"""SCENE-Net and the CNN: number of parameters, probabilities and equivariance."""
 
 from __future__ import annotations
 
@@ -137,7 +137,7 @@ def test_a_rotated_crop_gives_the_rotated_prediction(seed, size):
 
 
 def test_a_crop_on_its_side_does_not_give_the_prediction_on_its_side():
-    # Towers stand: only turns about the vertical are a symmetry.
+    # Towers are vertical: only rotations about the vertical are a symmetry.
     scene = volume(7, (14, 14, 14))
     expected = torch.rot90(answer(seeded(2), scene), dims=(1, 2))
     on_its_side = answer(seeded(2), np.rot90(scene, axes=(0, 1)))
@@ -192,7 +192,7 @@ def test_another_kernel_size_keeps_the_parameters():
     assert taller.shape_parameters() == model.shape_parameters()
     assert taller.observer()[0].shape == (15, 5, 5)
     assert model.kernel_size == (9, 9, 9)
-    # The inner part of a sphere is the same whatever is around it.
+    # The inner part of the sphere does not depend on the kernel size.
     assert torch.equal(taller.kernels()[2][3:12], model.kernels()[2][:, 2:7, 2:7])
 
 

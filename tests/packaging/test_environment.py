@@ -1,4 +1,4 @@
-"""The three places that name versions agree, and the extras divide the dependencies as promised."""
+"""The three lists of versions agree, and the extras divide the dependencies as documented."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_conda_environment_has_the_same_versions(project_root, direct, const
 
 
 def test_the_package_metadata_locks_no_version(direct):
-    # mkdocs 2 drops the plugins that the site is made with, so that bound is a real one.
+    # mkdocs 2 does not support the plugins of the site, so this bound is needed.
     locked = [r for r in direct if "==" in r or ("<" in r and _name(r) != "mkdocs")]
     assert locked == []
 

@@ -1,4 +1,4 @@
-"""The package as a user gets it: built, installed in a fresh environment without extras, used."""
+"""The package is built, installed in a fresh environment without extras, and used."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def installed(built: Built, project_root: Path, tmp_path_factory) -> Installed:
     made = _run([sys.executable, "-m", "venv", str(folder / "venv")], folder)
     assert made.returncode == 0, made.stderr
     pip = [str(folder / "venv" / "bin" / "python"), "-m", "pip", "install", "--quiet"]
-    # Compiling every module of torch takes half of the time; only what is imported is compiled so.
+    # Compiling every module of torch takes half of the time; without it only imported ones are.
     pip += ["--disable-pip-version-check", "--no-compile"]
     done = _run([*pip, "-c", str(project_root / "constraints.txt"), str(built.wheel)], folder)
     assert done.returncode == 0, done.stderr

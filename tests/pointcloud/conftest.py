@@ -1,4 +1,4 @@
-"""Small LAS files of every kind, made on the spot."""
+"""Small LAS files of every kind, generated for the tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A survey comes back with dimensions added and not one byte of it lost."""
+"""Dimensions are added to a survey, and every byte of it is kept."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def assert_same_but_for_additions(source, target) -> None:
     old, new = read_header(source), read_header(target)
     records, widened = records_of(source), records_of(target)
     assert records.dtype.names + tuple(NAMES) == widened.dtype.names
-    for name in records.dtype.names:  # bytes: a number that is none is equal to itself, too
+    for name in records.dtype.names:  # bytes, because NaN is not equal to itself
         assert records[name].tobytes() == widened[name].tobytes(), name
     skipped = {("LASF_Spec", 4), ("laszip encoded", 22204)}
     for vlr in old.vlrs:
@@ -212,7 +212,9 @@ def test_no_dimension_has_the_bounds_of_another(make_las, tmp_path):
 def test_records_that_laspy_interprets_come_back_as_bytes(make_las, tmp_path):
     source, target = make_las("in.las"), tmp_path / "out.laz"
     las = laspy.read(source)
-    lookup = struct.pack("<B15s", 15, b"Tower (steel).")  # laspy drops what is no letter or number
+    lookup = struct.pack(
+        "<B15s", 15, b"Tower (steel)."
+    )  # laspy drops characters other than letters and digits
     las.header.vlrs.append(laspy.VLR("LASF_Spec", 0, "classes", lookup))
     las.header.vlrs.append(laspy.VLR("LASF_Projection", 2112, "WKT", b'LOCAL_CS["site"]\0\0\0'))
     las.write(source)

@@ -25,7 +25,7 @@ def save_pt(tmp_path, sample, **options):
 
 
 class Trap:
-    """What runs when it is unpickled."""
+    """The function that unpickling would call."""
 
     opened = False
 

@@ -1,4 +1,4 @@
-"""Forty-two awkward files: each ends in its points or in an error that names it, and soon."""
+"""Forty-two defective files: each quickly gives its points or an error that names it."""
 
 from __future__ import annotations
 

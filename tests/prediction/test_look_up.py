@@ -1,4 +1,4 @@
-"""What a prediction gives for points of the survey, while it is open."""
+"""Predictions for points of the survey, while the prediction is open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The occupied voxels around a place are those a search through all of them finds."""
+"""The occupied voxels around a position are those of a search through all voxels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A whole survey: every point comes back with its answer, and the towers are listed."""
+"""A whole survey: every point gets its prediction, and the towers are listed."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from scenenet.training.tuning import choose
 POLE = (500_020.5, 4_630_031.5)
 DUTCH_TOWER_HEIGHT_M = 42.0
 LONE_POLES = DetectionSettings(min_conductor=0)
-"""For scenes of poles without wires."""
+"""For scenes with poles without conductors."""
 ADDED = {
     "tower_probability": np.float32,
     "tower_id": np.uint32,
@@ -163,7 +163,7 @@ def test_the_points_of_the_tower_carry_its_number(predicted):
     assert of_tower.sum() == predicted.towers["features"][0]["properties"]["points"] > 100
     away = np.hypot(points.x[of_tower] - POLE[0], points.y[of_tower] - POLE[1])
     assert away.max() < LONE_POLES.body + 1.0
-    # Detected or not: a model answers little at the foot of a pole.
+    # Detected or not: the response at the foot of a pole is low.
     above_foot = np.asarray(points.z) > 100 + LONE_POLES.foot + 1.0
     pole = (np.asarray(points.classification) == 15) & above_foot
     assert of_tower[pole].all()
@@ -176,7 +176,7 @@ def test_shares_sum_to_one_where_there_is_a_response(predicted):
     total = np.abs(shares).sum(axis=0)
     assert np.all(np.isclose(total, 1, atol=1e-5) | (total == 0))
     assert np.isclose(total, 1, atol=1e-5).mean() > 0.9
-    # What is called a tower is so because more speaks for it than against it.
+    # In the voxels of a tower, supporting shares outweigh opposing ones.
     sure = points["tower_probability"] > 0
     assert (shares[:, sure].sum(axis=0) > 0).all()
     assert sure.any()
@@ -250,7 +250,7 @@ def test_towers_are_numbered_in_the_list_and_in_the_points(scene, model, tmp_pat
     for number, (x, y) in places.items():
         mine = line.points["tower_id"] == number
         assert np.hypot(line.points.x[mine] - x, line.points.y[mine] - y).max() < 2
-    assert "crs" not in line.towers  # the survey names none, and none is made up
+    assert "crs" not in line.towers  # the survey has none, and none is invented
 
 
 def test_a_survey_without_points_gives_an_empty_list(model, tmp_path):
@@ -314,7 +314,7 @@ def test_a_cnn_gives_probabilities_and_no_shares(survey, pole_finder, tmp_path):
 
 @pytest.fixture(scope="module")
 def real_model(real_samples, tmp_path_factory) -> Path:
-    """A SCENE-Net trained on the real crops: tau and kernel size tuned on the same few."""
+    """A SCENE-Net trained on the real crops, with tau and kernel size tuned on the same crops."""
     samples = list(real_samples.values())
     settings = ModelSettings(
         name="real",

@@ -1,4 +1,4 @@
-"""A survey in tiles gives the answer of the survey in one piece."""
+"""A survey in tiles has the prediction of the survey in one piece."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])
 
 
 def survey(seed: int = 0, n: int = 20_000, extent=(150.0, 90.0, 30.0)) -> np.ndarray:
-    """Points over several tiles; the lower left part lies in tiles of negative number."""
+    """Points over several tiles; those at the lower left have negative numbers."""
     rng = np.random.default_rng(seed)
     return rng.uniform([-20, -20, -10], extent, (n, 3))
 
@@ -117,7 +117,7 @@ def test_groups_have_the_rows_of_each_code(codes):
 
 
 class Card:
-    """What predict_tile needs to know of a model's card."""
+    """A model card with the fields that predict_tile reads."""
 
     def __init__(self, measurement: str) -> None:
         self.measurement = measurement
@@ -167,7 +167,7 @@ def test_tiles_give_the_prediction_of_the_whole_survey(tmp_path, model, measurem
 def test_the_position_of_tiles_has_no_effect(tmp_path_factory, shift, seed):
     model = SceneNet(kernel_size=(5, 5, 5), generator=torch.Generator().manual_seed(seed))
     rng = np.random.default_rng(seed)
-    xyz = rng.integers(-8, 8, (300, 3)) + 0.5  # middles of voxels, about the corner of a tile
+    xyz = rng.integers(-8, 8, (300, 3)) + 0.5  # centres of voxels around the corner of a tile
     answers = []
     for moved in (xyz, xyz + np.array(shift)[::-1]):
         spool = spooled(tmp_path_factory.mktemp("tiles"), moved)

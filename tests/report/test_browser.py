@@ -1,4 +1,4 @@
-"""The page as a reader has it in Chromium: light and dark, wide and narrow, without a network."""
+"""The page in Chromium: light and dark, wide and narrow, without a network."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ CONTRASTS = """() => {
   }
   return found;
 }"""
-"""Lowest contrast of text with what is behind it, by kind of element (WCAG 2)."""
+"""Lowest contrast of text with its background, by kind of element (WCAG 2)."""
 
 
 @pytest.fixture
 def scene(page: Path, results: Results, thesis: Thesis) -> dict:
-    """What the turning crop of the page is made from."""
+    """The data of the interactive crop of the page."""
     made = write_scene(
         results, "scenenet", "best", results.folder / "interactive_crop" / "best.json"
     )
@@ -65,7 +65,7 @@ def scene(page: Path, results: Results, thesis: Thesis) -> dict:
 
 @contextlib.contextmanager
 def opened(pictures, file: Path, **window):
-    """The page, which must ask for nothing and complain of nothing while it is used."""
+    """The page, which must not request anything or report an error while it is used."""
     faults, asked = [], []
     with pictures.browsing(**window) as tab:
         tab.on("pageerror", lambda error: faults.append(str(error)))

@@ -99,7 +99,7 @@ def crossed_runs() -> pd.DataFrame:
 
 
 def test_every_experiment_has_settings_a_figure_runs_in_mlflow_and_a_section():
-    """The packages above the registry register by name; none may be missing."""
+    """Packages above the registry register by name; none may be missing."""
     names = set(EXPERIMENTS)
     assert names == set(EXPERIMENT_DRAWINGS) == set(EXPERIMENT_GROUPS) == set(EXPERIMENT_SECTIONS)
     for name, experiment in EXPERIMENTS.items():

@@ -1,4 +1,4 @@
-"""The report is one page that opens offline and says what the result files say."""
+"""The report is one page that opens offline and shows the content of the result files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ VOID = {"meta", "img", "br", "hr", "link"}
 
 
 class Page(HTMLParser):
-    """Elements of a page, and whether every one was closed in order."""
+    """The elements of a page, and whether all are closed in order."""
 
     def __init__(self, html: str) -> None:
         super().__init__()

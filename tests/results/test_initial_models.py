@@ -1,4 +1,4 @@
-"""What a model began with is drawn again, or read from its history."""
+"""The initial model is drawn again, or read from the history."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def result(settings: ModelSettings, history: pd.DataFrame | None = None) -> Seed
 
 
 def test_the_initial_model_of_the_thesis_protocol_follows_from_the_seed(scene):
-    """A training that takes steps of no length ends where it began."""
+    """A training with steps of length 0 ends with the initial model."""
     cloud = scene(((8.5, 9.5),), size=(20, 20), tree=None)
     crops = [voxelise(cloud, VoxelGrid.metric(cloud.xyz, 1.0), "toy")]
     still = TrainingSettings(epochs=1, learning_rate=1e-30)

@@ -1,4 +1,4 @@
-"""Tables hold the numbers of the result files, and the thesis' beside them."""
+"""Tables have the numbers of the result files and of the thesis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every published number has its counterpart, or says why not."""
+"""Every published number has its counterpart or a reason."""
 
 from __future__ import annotations
 

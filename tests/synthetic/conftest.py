@@ -29,7 +29,7 @@ BARE = {
     "ranging_noise": 0.0,
     "swath_overlap": 0.0,
 }
-"""Nothing but ground, towers and wires."""
+"""Only ground, towers and conductors."""
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +40,7 @@ def small():
 
 @pytest.fixture(scope="session")
 def bare(small):
-    """The same with nothing on the ground but the line, and no noise."""
+    """The same with only the line on the ground, and without noise."""
     return lambda **changes: small(**(BARE | changes))
 
 

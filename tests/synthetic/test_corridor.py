@@ -1,4 +1,4 @@
-"""A synthetic corridor: what is in it, and that it is the same each time."""
+"""A synthetic corridor: its content and its reproducibility."""
 
 from __future__ import annotations
 
@@ -135,7 +135,7 @@ def test_classes_are_edp_codes_with_the_bulk_where_the_thesis_has_it(default):
         assert set(np.unique(codes).tolist()) <= set(EDP.classes)
     assert set(np.unique(truth).tolist()) == {1, 2, 3, 4, 5, 7, 10, 11, 12, 15, 16, 19}
     share = np.bincount(cloud.classification, minlength=22) / len(cloud)
-    # Thesis Table 5.1: 87 % in classes 10, 11 and 12, 0.5 % tower, 0.9 % wire.
+    # Thesis Table 5.1: 87 % in classes 10, 11 and 12, 0.5 % tower, 0.9 % conductor.
     assert share[[10, 11, 12]].sum() > 0.7
     assert 0.002 < share[TOWER] < 0.02
     assert 0.002 < share[CONDUCTOR] < 0.02

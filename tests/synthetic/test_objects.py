@@ -1,4 +1,4 @@
-"""Every kind of thing is there when it is asked for, and can be left out."""
+"""Every kind of object can be switched on and off."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_a_second_pass_doubles_the_density_where_it_overlaps(bare):
 
 
 def test_houses_throw_a_shadow(bare):
-    """Behind a wall there is ground that no pulse reaches."""
+    """No pulse reaches the ground behind a wall."""
     scan = {"density": 150.0, "flight_height": (40.0, 40.0), "relief": 0.0}
     houses = bare(clutter=100.0, clutter_kinds={"house": 1.0}, **scan)
     cells = [

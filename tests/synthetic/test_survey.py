@@ -61,7 +61,7 @@ def test_memory_does_not_grow_with_the_line(small, tmp_path, workers):
         return most, summary["points"]
 
     peak(2)  # compiles
-    # Long enough that both workers have all that they may have at a time.
+    # Long enough that both workers reach their largest memory.
     (short, few), (long, many) = peak(12), peak(60)
     assert many > 4 * few
     assert long < 1.5 * short

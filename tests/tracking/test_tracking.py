@@ -1,4 +1,4 @@
-"""Runs in a real MLflow store: one for each training, replaced and never doubled."""
+"""Runs in a real MLflow store: one for each training, replaced and never duplicated."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from scenenet.tracking.study_runs import note_of, study_groups
 
 @pytest.fixture(scope="session")
 def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """MLflow's tables without an experiment of ours: seconds to make, so made once and copied."""
+    """MLflow's tables without our experiments; creating them takes seconds, so they are copied."""
     folder = tmp_path_factory.mktemp("mlflow")
     settings = TrackingSettings(uri=f"sqlite:///{folder / 'mlflow.db'}")
     command = [sys.executable, "-m", "mlflow", "db", "upgrade", settings.uri]
@@ -441,7 +441,7 @@ def test_the_best_seed_is_in_the_registry_and_predicts_a_batch_of_any_size(
     assert registered["scenenet-scenenet"]["version"] == 1
     grids = np.zeros((3, 9, 8, 7), np.float32)
     grids[0, 2:7, 3, 3] = grids[2, 4, 4, 4] = 1
-    # In a process of its own, as somebody else would load it.
+    # In another process, as a user would load it.
     np.save(tmp_path / "grids.npy", grids)
     code = (
         "import sys, numpy as np, mlflow; mlflow.set_tracking_uri(sys.argv[1]);"
@@ -463,7 +463,7 @@ def test_the_best_seed_is_in_the_registry_and_predicts_a_batch_of_any_size(
 
     again = register_champions(*arguments)
     assert again["scenenet-scenenet"]["version"] == 1, "the same champion is no new version"
-    # Another seed takes the lead: the alias moves on, the first version stays.
+    # Another seed becomes the best: the alias moves, the first version stays.
     better = results.folder / "tune" / "scenenet" / f"seed-{1 - best.seed}.json"
     tuning = json.loads(better.read_text())
     tuning["validation"]["f05"] = 0.99
@@ -483,7 +483,7 @@ def test_the_best_seed_is_in_the_registry_and_predicts_a_batch_of_any_size(
 
 
 def test_the_best_of_all_models_is_the_champion_of_the_run(settings, results, tmp_path):
-    """That of each model has a name of its own; the bare name is the best there is."""
+    """The champion of each model has its own name; the name of the run is the best of all."""
     client = MlflowClient(tracking_uri=settings.uri)
     arguments = (settings, results, "toys", tmp_path / "runs.json", tmp_path / "registry.json")
     log_runs(settings, model_groups(results, "toys"), tmp_path / "runs.json")
@@ -493,7 +493,7 @@ def test_the_best_of_all_models_is_the_champion_of_the_run(settings, results, tm
     version = client.get_model_version_by_alias("scenenet", "champion")
     assert version.run_id == registered["scenenet-scenenet"]["run_id"]
     assert (version.tags["model"], version.tags["seed"]) == ("scenenet", "0")
-    # The CNN takes the lead.
+    # The CNN becomes the best.
     tuned = results.folder / "tune" / "cnn" / "seed-0.json"
     tuning = json.loads(tuned.read_text())
     tuning["validation"]["f05"] = 0.99

@@ -1,4 +1,4 @@
-"""Cross entropy is torch's own where that has a value, and has one everywhere (thesis 5.3.3)."""
+"""Cross entropy equals torch's where that is finite, and is finite everywhere (thesis 5.3.3)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def numbers(seed: int, bias, dtype=torch.float64, scale=0.3):
 
 
 def plain(occupancy, kernel, bias, tower) -> torch.Tensor:
-    """What torch makes of it, with the least probability of a tower voxel as here."""
+    """Cross entropy of torch, with the same lower bound on the probability of tower voxels."""
     answer = convolve_dense(occupancy, kernel) + (0 if bias is None else bias)
     probability = torch.relu(torch.tanh(answer)).reshape(-1)
     truth = torch.zeros_like(probability)

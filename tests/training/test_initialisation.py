@@ -1,4 +1,4 @@
-"""Starts that look at the data."""
+"""Initial models that depend on the data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The GENEO loss, with numbers one can work out by hand (thesis 4.5)."""
+"""The GENEO loss, with numbers that can be calculated by hand (thesis 4.5)."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ POSITIVE = {
         ({}, 0.0),
         ({"cylinder.sigma": -0.5}, 2 * 0.5),
         ({"arrow.beta": -0.25, "negative_sphere.r": -1.0}, 2 * 1.25),
-        # The derived weight is penalised as the others are.
+        # The derived weight is penalised like the others.
         ({"lambda.cylinder": 0.8, "lambda.negative_sphere": -0.1}, 3 * 0.1),
         ({"lambda.cylinder": -0.5, "lambda.negative_sphere": 1.2, "arrow.r": -1.0}, 3 * 0.5 + 2),
     ],
@@ -122,7 +122,7 @@ def test_a_quadratic_penalty_is_weak_just_below_zero_where_a_linear_one_is_not()
         loss = negativity(model, settings)
         loss.backward()
         sigma, r = model.shapes["cylinder"]["sigma"], model.shapes["arrow"]["r"]
-        # The square of what torch itself says is negative, or that.
+        # The absolute value of a negative parameter, or its square.
         lacks = torch.relu(-torch.stack([sigma, r]).detach())
         expected = lacks.sum() if penalty == "linear" else (lacks**2).sum()
         torch.testing.assert_close(loss.detach(), 5.0 * expected)

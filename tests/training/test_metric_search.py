@@ -121,7 +121,7 @@ def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
     with pytest.raises(PowerCut):
         fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
     monkeypatch.undo()
-    monkeypatch.setattr(metric_search, "begin", None)  # whoever begins anew fails
+    monkeypatch.setattr(metric_search, "begin", None)  # a search that starts again fails
     resumed, history = fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
     assert resumed.numbers().tolist() == straight.numbers().tolist()
     pd.testing.assert_frame_equal(
@@ -148,7 +148,7 @@ def test_half_the_voxel_size_covers_the_same_metres():
     assert fine.kernel_size == (13, 9, 9)
     assert fine.shape_parameters() == model.shape_parameters()
     assert fine.at(1.0).kernel_size == model.kernel_size
-    # The same places of the kernels; H is weighted by the voxel size.
+    # The same positions of the kernels; H is weighted by the voxel size.
     sphere, of_fine = model.kernels()[2], fine.kernels()[2]
     torch.testing.assert_close(of_fine[::2, ::2, ::2], sphere / 2)
 
@@ -214,7 +214,7 @@ def test_its_file_has_units_of_metres_and_reads_back(tmp_path):
 
 
 def test_a_file_of_version_0_1_reads_back(tmp_path):
-    """It called the lengths ``field`` and had format version 2."""
+    """In this file the lengths are called ``field``, with format version 2."""
     model = net(5)
     write_model(tmp_path / "m.json", model, card_for(model))
     written = json.loads((tmp_path / "m.json").read_text())

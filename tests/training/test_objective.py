@@ -1,4 +1,4 @@
-"""Numbers searched for without a gradient."""
+"""The search without a gradient."""
 
 from __future__ import annotations
 

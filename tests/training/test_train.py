@@ -1,4 +1,4 @@
-"""Training: the same numbers each time, also when interrupted, and a loss that falls."""
+"""Training is reproducible, also after an interruption, and the loss falls."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def cut_after(monkeypatch):
 
         def interrupted(*args):
             if next(done, None) is None:
-                original(*args)  # the numbers have moved, and nobody wrote that down
+                original(*args)  # the parameters have changed since the last checkpoint
                 raise PowerCut
             return original(*args)
 
@@ -89,7 +89,10 @@ def cut_after(monkeypatch):
         {"optimiser": "adam"},
         {"optimiser": "sgd"},
         {"decay": 0.5, "decay_every": 1},
-        {"decay": 0.25, "decay_every": 3},  # the next loss of rate comes after the interruption
+        {
+            "decay": 0.25,
+            "decay_every": 3,
+        },  # the next decrease of the rate is after the interruption
         {"loss": LossSettings(fidelity="cross_entropy", penalty="quadratic")},
     ],
     ids=str,
@@ -239,4 +242,4 @@ def test_training_writes_model_and_history_and_removes_its_checkpoint(chain, tmp
     assert card.tau is None
     assert card.provenance["seed"] == 3
     assert card.provenance["config"] == "abc"
-    assert card.provenance["training_crops"] == 2  # those of the training part, and no other
+    assert card.provenance["training_crops"] == 2  # only those of the training part

@@ -1,4 +1,4 @@
-"""What is chosen on the validation part: tau, the kernel size, the champion."""
+"""Choices on the validation part: tau, the kernel size, the champion."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_tau_is_where_f05_is_highest_on_validation(pole_finder, crops):
 
 def test_the_better_kernel_size_is_chosen(pole_finder, crops):
     model, card = pole_finder
-    flat = model.with_kernel_size((1, 3, 3))  # sees nothing that stands
+    flat = model.with_kernel_size((1, 3, 3))  # does not respond to vertical objects
     settings = TuningSettings(kernel_sizes=((1, 3, 3), (9, 9, 9)))
     chosen, _, result = choose(flat, card, crops, settings)
     assert chosen.kernel_size == (9, 9, 9)

@@ -23,7 +23,7 @@ RUN_LIMIT_S = 1800
 
 @dataclass(frozen=True)
 class Project:
-    """A folder with the workflow in it, as a user has it.
+    """A folder with the workflow.
 
     Attributes:
         folder: its root.
@@ -58,7 +58,7 @@ class Project:
         return done.stdout
 
     def planned(self, *arguments: str) -> dict[str, int]:
-        """Rule -> number of jobs that a run would have; empty where nothing is to be done."""
+        """Rule -> number of jobs that a run would have; empty if everything is up to date."""
         shown = self.run("-n", *arguments)
         if "Nothing to be done" in shown:
             return {}
@@ -68,7 +68,7 @@ class Project:
         return {rule: int(count) for rule, count in counts if rule != "all"}
 
     def refused(self, *arguments: str) -> str:
-        """The message where no job may start."""
+        """The error message of a call that must not start any job."""
         done = self.snakemake("-n", *arguments)
         assert done.returncode != 0
         assert "Job stats" not in done.stdout
@@ -110,7 +110,7 @@ def project_in(project_root: Path) -> Callable[[Path], Project]:
 
 @pytest.fixture(scope="session")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A survey that the workflow did not make."""
+    """A survey that the workflow did not generate."""
     from scenenet.synthetic import SyntheticSettings, make_survey
 
     path = tmp_path_factory.mktemp("recorded") / "own.laz"

@@ -67,7 +67,7 @@ def test_the_report_has_every_result_with_a_caption_and_changes_nothing(reported
         }, path  # fmt: skip
         assert entry["labels"], path
         assert entry["data_uri"].startswith("data:"), path
-    # Two with the same labels in one place would be one row, and one of them could not be opened.
+    # Two entries with the same labels would share a row, and one of them could not be opened.
     rows = [(e["category"], e["group"], *e["labels"].values()) for e in shown.values()]
     assert len(rows) == len(set(rows))
     assert reported.planned() == {}

@@ -1,5 +1,5 @@
-"""What the tables and the page say is worked out again from models, voxels and split, with nothing
-of the package: kernels by the thesis' formulas, convolution by shifts, counts by numpy."""
+"""The numbers in tables and page are calculated again from models, voxels and split, without code
+of the package: kernels from the formulas of the thesis, convolution by shifts, counts by numpy."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.workflow
 
 MODEL = "scenenet"
 AT_THE_BORDER = 0.005
-"""What a score may differ by: a few voxels lie so near to tau that rounding decides."""
+"""Tolerance of a score: a few voxels are so close to tau that rounding decides."""
 
 
 def kernel_of(model: dict) -> np.ndarray:
@@ -69,7 +69,7 @@ def crops_scored(results: Path) -> dict[str, str]:
 
 @pytest.fixture(scope="module")
 def recounted(finished) -> dict[str, float]:
-    """Precision, recall, F0.5 and IoU of the seed that is best on validation, counted anew."""
+    """Precision, recall, F0.5 and IoU of the best seed on validation, counted again."""
     best = max(
         (json.loads(p.read_text()) | {"seed": p.stem}
          for p in sorted((finished.results / "tune" / MODEL).glob("seed-?.json"))),

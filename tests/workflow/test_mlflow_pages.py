@@ -1,4 +1,4 @@
-"""MLflow's own pages show the runs of the workflow: names and numbers of our tables, to compare."""
+"""The pages of MLflow show the runs of the workflow with the names and numbers of our tables."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def rows_of(table: Path) -> list[dict[str, str]]:
 
 
 def metrics_of(page, runs: int, named: str) -> dict[str, list[float]]:
-    """The table of metrics, once it has the one that is ``named``."""
+    """The table of metrics, once it shows the metric ``named``."""
     for _ in range(ATTEMPTS):
         found = page.evaluate(METRICS)
         if len(found.get(named, [])) == runs:
@@ -74,7 +74,7 @@ def metrics_of(page, runs: int, named: str) -> dict[str, list[float]]:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_the_variants_of_the_ablation_study_are_compared(finished, store, pictures, scheme):
-    """As a person goes there: the list of runs, all ticked, *Compare*."""
+    """The way of a user: the list of runs, all selected, *Compare*."""
     table = rows_of(finished.results / "tables" / "study-ablations.csv")
     names = [row["variant"] for row in table]
     with pictures.browsing(scheme=scheme, **LARGE) as page:

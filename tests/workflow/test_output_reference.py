@@ -1,5 +1,5 @@
 """``docs/reference/output.md`` describes what a run writes: no file, column, key or dimension is
-missing there, and none is invented."""
+missing there, and none is superfluous."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import pytest
 pytestmark = pytest.mark.workflow
 
 LONGEST = 14
-"""Lines that a refusal may have, the name of the Snakefile and an empty line included."""
+"""Largest number of lines of an error, the name of the Snakefile and an empty line included."""
 
 
 def short(message: str) -> str:

@@ -1,4 +1,4 @@
-"""Rules are forms that are filled in the same order, and profiles and environments agree."""
+"""All rules have their directives in one order, and profiles and environments agree."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_every_stage_has_a_script_and_every_script_a_rule(project_root):
 
 
 def test_scripts_know_nothing_of_the_configuration(project_root):
-    """What they read from it would not be among their parameters, and a change would be missed."""
+    """A value that they read from it would not be a parameter, so a change would go unnoticed."""
     for script in (project_root / "workflow" / "scripts").glob("*.py"):
         assert ".config" not in re.sub(r"output\.config", "", script.read_text()), script.name
 

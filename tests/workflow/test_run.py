@@ -1,4 +1,4 @@
-"""The whole chain, once."""
+"""A run of the whole workflow."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_a_fault_of_the_code_leaves_its_traceback_in_the_log(project):
 
 
 def test_a_store_that_was_damaged_is_refused(project):
-    """Its manifest knows it. The date is the old one, so only reading can tell."""
+    """The manifest has its digest. The date is unchanged, so only reading can detect the damage."""
     store = project.results / "crops/first/crops.zarr.zip"
     status = store.stat()
     damaged = bytearray(store.read_bytes())

@@ -1,5 +1,5 @@
-"""Every table and figure of thesis chapters 4 and 5 that we make has its place in the results, and
-holds the thesis' numbers where there are any."""
+"""Every reproduced table and figure of thesis chapters 4 and 5 is in the results, and
+has the numbers of the thesis, if there are any."""
 
 from __future__ import annotations
 
@@ -179,7 +179,7 @@ LISTED = {
 }
 """Values that the thesis lists in 5.3.3 and 5.3.4."""
 ADDED = {"alpha-epsilon": [0.1], "learning-rate": [0.01]}
-"""What is tried besides: the epsilon of 5.2.1, and the rate that we use."""
+"""Values added to these: the epsilon of 5.2.1, and our learning rate."""
 
 
 @pytest.mark.parametrize("name", LISTED)

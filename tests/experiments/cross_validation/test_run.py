@@ -1,4 +1,4 @@
-"""Every crop is scored once a seed by a model that has not seen it."""
+"""For each seed, every crop is scored once by a model that was not trained on it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ GRID = VoxelSettings(resolution=32)
 
 @pytest.fixture(scope="module")
 def manifest(tmp_path_factory):
-    """Voxels of a synthetic line, as the workflow makes them."""
+    """Voxels of a synthetic line, from the stages of the workflow."""
     folder = tmp_path_factory.mktemp("crossed")
     line = SyntheticSettings(towers=6, seed=4, density=12, tower_density=24)
     make_survey(line, folder / "line.laz")
@@ -74,7 +74,7 @@ def test_the_boosted_trees_take_part(manifest):
 
 
 def runs() -> pd.DataFrame:
-    """Two seeds and two folds with counts that can be worked out by hand."""
+    """Two seeds and two folds with counts that can be calculated by hand."""
     rows = []
     for seed, fold, tp, fp, fn, f05 in [(0, 1, 8, 2, 10, 0.6), (0, 2, 2, 0, 2, 0.8),
                                         (1, 1, 6, 4, 12, 0.4), (1, 2, 0, 0, 4, 0.0)]:  # fmt: skip

@@ -1,4 +1,4 @@
-"""Properties of a crop that was built to have them."""
+"""Properties of a crop that was built with known values."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SIDE = 30.0
 
 @pytest.fixture(scope="module")
 def built() -> PointCloud:
-    """Sloping ground at 25 points a m^2, a pole of 16 m, three wires, a grove, two strays."""
+    """Sloping ground at 25 points per m^2, a 16 m pole, three conductors, a grove, two strays."""
     rng = np.random.default_rng(0)
     x, y = (axis.ravel() for axis in np.meshgrid(*[np.arange(0.1, SIDE, 0.2)] * 2))
     parts, codes = [np.column_stack((x, y, np.tan(SLOPE) * x))], [np.full(len(x), 10)]

@@ -1,4 +1,4 @@
-"""Models learn from wrong labels, are scored against both, and the verdict follows by rule."""
+"""Models are trained on wrong labels and scored against labels and truth; a rule decides."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A study trains what it says, once, and scores it as a training by itself would be scored."""
+"""A study trains each variant once and scores it like a single training."""
 
 from __future__ import annotations
 

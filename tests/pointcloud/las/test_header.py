@@ -1,4 +1,4 @@
-"""A header is compared with the file before anybody believes it."""
+"""A header is compared with the file before it is used."""
 
 from __future__ import annotations
 

@@ -81,7 +81,7 @@ def test_damage_in_the_compressed_points_is_an_error_or_points_but_never_a_crash
 
 
 def test_a_panic_of_the_decoder_becomes_an_error(make_las, patched):
-    # Without chunks, of 0 points each: what LASzip 1.2 wrote, and lazrs panics about.
+    # Without chunks, of 0 points each, as LASzip 1.2 wrote it; lazrs panics on it.
     laz = make_las("survey.laz", version="1.2", point_format=1, n=1000)
     at = laz.read_bytes().index(b"laszip encoded") - 2 + 54
     early = patched(laz, {at: struct.pack("<H", 1), at + 12: struct.pack("<I", 0)})

@@ -1,4 +1,4 @@
-"""The ground is one field, whichever stretch asks for it."""
+"""The ground is one field, the same for all stretches."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log):
 
 
 PLACE = np.array([500_000.0, 4_630_000.0, 100.0])
-"""Origin of the small scenes, m: far from zero like surveys, so that float32 cannot resolve metres."""
+"""Origin of the small scenes, m: far from zero like surveys; float32 cannot resolve metres."""
 GROUND, TREE, TOWER = 2, 4, 15
 SCENE_WIDTH_M = 30.0
 
@@ -194,7 +194,7 @@ class Lattice:
         return cls.voxels(np.column_stack([np.full(len(z), x), np.full(len(z), y), z]))
 
     @classmethod
-    def wires(
+    def conductors(
         cls,
         bearing: float,
         height: float,

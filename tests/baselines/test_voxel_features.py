@@ -25,7 +25,7 @@ def pole(height: float = POLE, foot: float = 0.0) -> np.ndarray:
     return np.column_stack([np.full(len(z), 20.1), np.full(len(z), 20.1), foot + z])
 
 
-def wire(height: float = 12.1) -> np.ndarray:
+def conductor(height: float = 12.1) -> np.ndarray:
     x = np.arange(0.05, SIDE, 0.1)
     return np.column_stack([x, np.full(len(x), 20.1), np.full(len(x), height)])
 
@@ -58,7 +58,7 @@ def test_each_feature_has_a_unique_name_a_unit_and_a_meaning():
 
 
 def test_a_row_per_voxel_and_a_column_per_feature():
-    sample = sample_of(flat_ground(), pole(), wire())
+    sample = sample_of(flat_ground(), pole(), conductor())
     features = voxel_features(sample)
     assert features.shape == (len(sample.index), len(FEATURES))
     assert features.dtype == np.float32
@@ -92,7 +92,7 @@ def test_ground_has_no_height():
 
 
 def test_conductors_are_measured_from_the_pole_and_from_themselves():
-    sample = sample_of(flat_ground(), pole(), wire())
+    sample = sample_of(flat_ground(), pole(), conductor())
     body = at(sample, (20.1, 20.1, 5.5))
     assert (
         body["conductor_distance"] <= 4
@@ -128,7 +128,7 @@ def test_a_hole_in_the_ground_does_not_raise_its_neighbours():
 
 
 def test_features_do_not_depend_on_labels_or_position():
-    sample = sample_of(flat_ground(), pole(), wire())
+    sample = sample_of(flat_ground(), pole(), conductor())
     expected = voxel_features(sample)
     labelled = replace(sample, tower=np.ones(len(sample.index), bool))
     np.testing.assert_array_equal(voxel_features(labelled), expected)
@@ -137,14 +137,14 @@ def test_features_do_not_depend_on_labels_or_position():
 
 
 def test_a_scene_moved_by_whole_voxels_has_the_same_features():
-    parts = flat_ground(), pole(), wire()
+    parts = flat_ground(), pole(), conductor()
     one = sample_of(*parts, shape=(40, 48, 48))
     other = sample_of(*(p + np.array([6.0, 3.0, 0.0]) for p in parts), shape=(40, 48, 48))
     np.testing.assert_allclose(voxel_features(other), voxel_features(one), atol=1e-5)
 
 
 def test_a_scene_turned_by_a_quarter_has_the_same_features():
-    parts = [flat_ground(), pole(), wire()]
+    parts = [flat_ground(), pole(), conductor()]
     one = sample_of(*parts)
     turned = [np.column_stack([SIDE - p[:, 1], p[:, 0], p[:, 2]]) for p in parts]
     other = sample_of(*turned)
@@ -156,7 +156,7 @@ def test_a_scene_turned_by_a_quarter_has_the_same_features():
 
 
 def test_half_the_voxel_size_gives_about_the_same():
-    parts = flat_ground(), pole(), wire()
+    parts = flat_ground(), pole(), conductor()
     coarse = at(sample_of(*parts), (20.1, 20.1, 7.5))
     fine = at(sample_of(*parts, voxel_size=0.5), (20.1, 20.1, 7.5))
     for name in ("height", "run_2", "top_2", "filled_above_2", "protrusion", "overtop_12"):

@@ -39,8 +39,8 @@ def test_all_convolutions_give_the_same_result(samples, size):
     kernels = torch.randn((3, *size), generator=torch.Generator().manual_seed(0))
     ours = convolve(occupancy, kernels.sum(0))
     for way in (peers.conv3d_summed, peers.conv3d_three, peers.fft_summed, peers.published_code):
-        answer = way(occupancy.dense(), kernels).float()
-        torch.testing.assert_close(answer, ours, rtol=1e-4, atol=1e-3)
+        output = way(occupancy.dense(), kernels).float()
+        torch.testing.assert_close(output, ours, rtol=1e-4, atol=1e-3)
 
 
 def test_both_training_steps_have_the_same_error(samples):

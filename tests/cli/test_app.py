@@ -45,10 +45,10 @@ def model(survey, tmp_path_factory) -> Path:
     made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
                     "--seeds", 2, "--json")  # fmt: skip
     assert made.returncode == 0, made.stderr
-    answer = json.loads(made.stdout)
-    assert answer["crops"] == {"training": 4, "validation": 0}
-    assert answer["tuned_on"] == "training"
-    assert len(answer["seeds"]) == 2
+    output = json.loads(made.stdout)
+    assert output["crops"] == {"training": 4, "validation": 0}
+    assert output["tuned_on"] == "training"
+    assert len(output["seeds"]) == 2
     assert "generations" in made.stderr
     assert json.loads(out.read_text())["units"] == "m"
     made_by = json.loads(out.read_text())["provenance"]

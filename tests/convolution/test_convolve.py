@@ -45,11 +45,11 @@ def dense_convolution(occupancy: Occupancy, kernel: torch.Tensor) -> torch.Tenso
 def test_it_equals_conv3d_for_any_shape_and_kernel_size(shape, size, n_grids, share, valued, seed):
     occupancy = grids(shape, n_grids, share, seed, valued=valued)
     kernel = torch.from_numpy(np.random.default_rng(seed).normal(size=size))
-    answer = convolve(occupancy, kernel)
-    assert answer.shape == (n_grids, *shape)
+    response = convolve(occupancy, kernel)
+    assert response.shape == (n_grids, *shape)
     if n_grids:
         expected = dense_convolution(occupancy, kernel)
-        torch.testing.assert_close(answer, expected, rtol=0, atol=1e-11)
+        torch.testing.assert_close(response, expected, rtol=0, atol=1e-11)
         torch.testing.assert_close(convolve_dense(occupancy, kernel), expected, rtol=0, atol=1e-11)
 
 
@@ -57,9 +57,9 @@ def test_it_equals_conv3d_for_any_shape_and_kernel_size(shape, size, n_grids, sh
 def test_the_error_in_float32_is_rounding(shape, size, valued, seed):
     occupancy = grids(shape, 2, 0.3, seed, np.float32, valued)
     kernel = torch.from_numpy(np.random.default_rng(seed).normal(size=size).astype(np.float32))
-    answer = convolve(occupancy, kernel)
-    assert answer.dtype == torch.float32
-    torch.testing.assert_close(answer, dense_convolution(occupancy, kernel), rtol=1e-5, atol=2e-5)
+    response = convolve(occupancy, kernel)
+    assert response.dtype == torch.float32
+    torch.testing.assert_close(response, dense_convolution(occupancy, kernel), rtol=1e-5, atol=2e-5)
 
 
 @pytest.mark.parametrize("resolution", [64, 128])
@@ -67,8 +67,8 @@ def test_the_error_in_float32_is_rounding(shape, size, valued, seed):
 def test_it_equals_conv3d_at_the_usual_sizes(resolution, size):
     occupancy = grids((resolution,) * 3, 1, 0.01, seed=3, valued=False)
     kernel = torch.from_numpy(np.random.default_rng(1).normal(size=size).astype(np.float32))
-    answer, expected = convolve(occupancy, kernel), dense_convolution(occupancy, kernel)
-    torch.testing.assert_close(answer, expected, rtol=1e-5, atol=2e-5)
+    response, expected = convolve(occupancy, kernel), dense_convolution(occupancy, kernel)
+    torch.testing.assert_close(response, expected, rtol=1e-5, atol=2e-5)
 
 
 @given(shapes, sizes, st.booleans(), st.integers(0, 99))
@@ -177,15 +177,15 @@ def test_positions_out_of_order_or_outside_the_grid_are_refused(index):
 
 def test_the_response_does_not_depend_on_the_number_of_cores():
     occupancy = grids((64, 64, 64), 2, 0.01, seed=0, valued=False)
-    answers, gradients = [], []
+    responses, gradients = [], []
     before = numba.get_num_threads()
     for threads in (1, before):
         numba.set_num_threads(threads)
         kernel = torch.from_numpy(np.random.default_rng(0).normal(size=(9, 5, 5))).float()
         kernel.requires_grad_()
-        answers.append(convolve(occupancy, kernel))
-        answers[-1].square().sum().backward()
+        responses.append(convolve(occupancy, kernel))
+        responses[-1].square().sum().backward()
         gradients.append(kernel.grad)
     numba.set_num_threads(before)
-    assert torch.equal(*answers)
+    assert torch.equal(*responses)
     assert torch.equal(*gradients)

@@ -17,9 +17,11 @@ def occupied(*volumes: np.ndarray) -> Occupancy:
     return Occupancy.of_grids([np.flatnonzero(v) for v in volumes], None, volumes[0].shape)
 
 
-def of_volume(occupancy: Occupancy, answers: np.ndarray, radius: float, above: float) -> np.ndarray:
+def of_volume(
+    occupancy: Occupancy, responses: np.ndarray, radius: float, above: float
+) -> np.ndarray:
     section = neighbours(occupancy, section_offsets(radius, above, 1.0))
-    return answers[strongest(answers, *section)]
+    return responses[strongest(responses, *section)]
 
 
 @pytest.mark.parametrize(
@@ -47,15 +49,15 @@ def test_it_is_the_maximum_over_the_occupied_voxels_of_the_section(seed, radius,
     rng = np.random.default_rng(seed)
     volumes = [rng.random(SHAPE) < 0.3 for _ in range(2)]
     occupancy = occupied(*volumes)
-    answers = rng.normal(size=len(occupancy.index)).astype(np.float32)
+    responses = rng.normal(size=len(occupancy.index)).astype(np.float32)
     places = np.stack(np.unravel_index(occupancy.flat(), (2, *SHAPE)), axis=1)
     expected = []
     for grid, z, y, x in places:
         apart = places - [grid, z, y, x]
         inside = (apart[:, 0] == 0) & (apart[:, 1] >= 0) & (apart[:, 1] <= above)
         inside &= apart[:, 2] ** 2 + apart[:, 3] ** 2 <= (radius + 1e-6) ** 2
-        expected.append(answers[inside].max())
-    np.testing.assert_array_equal(of_volume(occupancy, answers, radius, above), expected)
+        expected.append(responses[inside].max())
+    np.testing.assert_array_equal(of_volume(occupancy, responses, radius, above), expected)
 
 
 @given(st.integers(0, 500))

@@ -115,12 +115,14 @@ def test_counts_at_every_threshold(shape, size, bias, share, scale, seed):
 
 
 def test_the_error_of_a_single_precision_probability_is_rounding():
-    answers = np.concatenate([np.linspace(0, 12, 50_001), np.logspace(-30, 1, 5_001), [-1.0, -50]])
+    responses = np.concatenate(
+        [np.linspace(0, 12, 50_001), np.logspace(-30, 1, 5_001), [-1.0, -50]]
+    )
     # One voxel at a time: a kernel of one element gives any response.
-    indices = [np.arange(len(answers))]
-    line = Occupancy.of_grids(indices, [answers.astype(np.float32)], (1, 1, len(answers)))
+    indices = [np.arange(len(responses))]
+    line = Occupancy.of_grids(indices, [responses.astype(np.float32)], (1, 1, len(responses)))
     got = observe(line, torch.ones(1, 1, 1)).numpy().reshape(-1)
-    expected = np.maximum(0, np.tanh(answers.astype(np.float32).astype(float)))
+    expected = np.maximum(0, np.tanh(responses.astype(np.float32).astype(float)))
     units = np.abs(got - expected) / np.spacing(np.maximum(expected, 1e-37).astype(np.float32))
     assert units.max() <= 3
     assert (got <= 1).all()

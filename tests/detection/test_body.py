@@ -60,8 +60,8 @@ def test_a_stray_return_high_above_is_not_its_top(lattice):
 
 
 def test_conductors_above_one_another_have_no_body(lattice):
-    wires = [lattice.column(0, 0, z, z + 1) for z in (18, 24, 30)]
-    body = stand(lattice, lattice.together(lattice.ground(), *wires), seen=(18.5, 30.5))
+    conductors = [lattice.column(0, 0, z, z + 1) for z in (18, 24, 30)]
+    body = stand(lattice, lattice.together(lattice.ground(), *conductors), seen=(18.5, 30.5))
     assert body.upright < 0.2
 
 
@@ -83,8 +83,8 @@ def test_the_centre_of_a_lattice_tower_is_found_from_its_legs(lattice):
 
 def test_conductors_and_crossarms_do_not_widen_a_body(lattice):
     pole = lattice.column(0, 0, 0, 16)
-    wires = [lattice.wires(b, 13.0) for b in (70, 250)]
-    around = lattice.together(lattice.ground(), pole, *wires)
+    conductors = [lattice.conductors(b, 13.0) for b in (70, 250)]
+    around = lattice.together(lattice.ground(), pole, *conductors)
     axis, width, free = centre_body(around, AXIS + lattice.place[:2], stand(lattice, around), 1.0)
     assert np.abs(axis - AXIS - lattice.place[:2]).max() < 0.1
     assert width == pytest.approx(1.0)

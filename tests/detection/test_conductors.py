@@ -23,7 +23,7 @@ def test_a_lone_pole_has_no_conductors(lattice):
 
 @pytest.mark.parametrize("bearing", [0, 30, 45, 110, 250, 355])
 def test_conductors_are_found_in_their_direction(lattice, bearing):
-    [span] = spans(lattice, lattice.ground(), lattice.wires(bearing, HEIGHT))
+    [span] = spans(lattice, lattice.ground(), lattice.conductors(bearing, HEIGHT))
     assert abs((span.bearing - bearing + 180) % 360 - 180) < 5
     assert span.length >= 0.9 * (FAR - NEAR)
     assert span.followed >= 0.9
@@ -31,30 +31,30 @@ def test_conductors_are_found_in_their_direction(lattice, bearing):
 
 @pytest.mark.parametrize("beside", [(0.0,), (-1.5, 0.0, 1.5), (-2.5, 0.0, 2.5), (-3.0, 3.0)])
 def test_any_number_of_conductors_at_any_distance_is_found(lattice, beside):
-    line = [lattice.wires(b, HEIGHT, beside=beside) for b in (60, 240)]
+    line = [lattice.conductors(b, HEIGHT, beside=beside) for b in (60, 240)]
     found = spans(lattice, lattice.ground(), *line)
     assert sorted(round(s.bearing / 10) * 10 for s in found) == [60, 240]
 
 
 def test_a_line_that_turns_leaves_in_two_directions(lattice):
-    line = [lattice.wires(b, HEIGHT) for b in (10, 100)]
+    line = [lattice.conductors(b, HEIGHT) for b in (10, 100)]
     assert len(spans(lattice, lattice.ground(), *line)) == 2
 
 
 def test_conductors_above_one_another_are_one_direction(lattice):
-    line = [lattice.wires(60, z, beside=(2.0,)) for z in (20.0, 25.0, 29.0)]
+    line = [lattice.conductors(60, z, beside=(2.0,)) for z in (20.0, 25.0, 29.0)]
     [span] = spans(lattice, lattice.ground(), *line, height=30.0, crossarm=7.0)
     assert span.bearing == pytest.approx(60, abs=5)
 
 
 def test_conductors_with_clearance_above_a_wood_are_found(lattice):
     wood = [lattice.tree(x, y, 10.0, seed=x + 18) for x in range(-18, 19, 6) for y in (-6, 0, 6)]
-    found = spans(lattice, lattice.ground(), lattice.wires(90, HEIGHT), *wood)
+    found = spans(lattice, lattice.ground(), lattice.conductors(90, HEIGHT), *wood)
     assert [round(s.bearing, -1) for s in found] == [90]
 
 
 def test_conductors_are_followed_to_the_edge_of_the_data(lattice):
-    inside = lattice.together(lattice.ground(), lattice.wires(90, HEIGHT))
+    inside = lattice.together(lattice.ground(), lattice.conductors(90, HEIGHT))
     seen = inside[np.hypot(*(inside - lattice.place)[:, :2].T) < 13]
     [span] = spans(lattice, seen)
     assert span.length < 11
@@ -62,12 +62,12 @@ def test_conductors_are_followed_to_the_edge_of_the_data(lattice):
 
 
 def test_conductors_of_a_line_that_passes_by_do_not_count(lattice):
-    passing = [lattice.wires(b, HEIGHT, y=9.0) for b in (90, 270)]
+    passing = [lattice.conductors(b, HEIGHT, y=9.0) for b in (90, 270)]
     assert spans(lattice, lattice.ground(), *passing) == []
 
 
 def test_conductors_far_below_the_head_do_not_count(lattice):
-    assert spans(lattice, lattice.ground(), lattice.wires(90, 0.4 * HEIGHT)) == []
+    assert spans(lattice, lattice.ground(), lattice.conductors(90, 0.4 * HEIGHT)) == []
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -106,7 +106,7 @@ def test_empty_surroundings_have_no_conductors(lattice):
 
 
 def test_spans_do_not_depend_on_the_order_of_the_voxels(lattice):
-    scene = lattice.together(lattice.ground(), *(lattice.wires(b, HEIGHT) for b in (75, 255)))
+    scene = lattice.together(lattice.ground(), *(lattice.conductors(b, HEIGHT) for b in (75, 255)))
     mixed = scene[np.random.default_rng(0).permutation(len(scene))]
     axis = (lattice.place[0] + 0.5, lattice.place[1] + 0.5)
     one, other = (

@@ -21,8 +21,8 @@ def pole(lattice):
 
     def make(x=0.0, y=0.0, height=15, bearings=(80, 260)):
         body = lattice.column(x, y, 0, height)
-        wires = [lattice.wires(b, height - 0.5, x=x + 0.5, y=y + 0.5) for b in bearings]
-        return lattice.together(body, *wires), body
+        conductors = [lattice.conductors(b, height - 0.5, x=x + 0.5, y=y + 0.5) for b in bearings]
+        return lattice.together(body, *conductors), body
 
     return make
 
@@ -88,7 +88,7 @@ def test_a_tree_detected_from_foot_to_top_is_not_a_tower(lattice):
 
 
 def test_conductors_above_one_another_are_not_a_tower(lattice):
-    levels = [lattice.wires(b, z, beside=(0.0,)) for b in (80, 260) for z in (18, 24, 30)]
+    levels = [lattice.conductors(b, z, beside=(0.0,)) for b in (80, 260) for z in (18, 24, 30)]
     above = np.concatenate([lattice.column(0, 0, z, z + 1) for z in (17, 18, 23, 24, 29, 30)])
     around = lattice.together(lattice.ground(), above, *levels)
     assert detect(above, around) == []
@@ -98,7 +98,7 @@ def test_conductors_above_one_another_are_not_a_tower(lattice):
 def test_a_wall_under_conductors_is_not_a_tower(lattice):
     x, y, z = (v.ravel() for v in np.meshgrid(np.arange(-9, 10), np.arange(-9, 10), np.arange(15)))
     block = lattice.voxels(np.column_stack([x, y, z]))
-    line = [lattice.wires(b, 15) for b in (80, 260)]
+    line = [lattice.conductors(b, 15) for b in (80, 260)]
     assert detect(upper(lattice.column(0, 0, 0, 15)), lattice.together(block, *line)) == []
 
 
@@ -166,7 +166,7 @@ def test_below_tau_conductors_must_leave_in_two_directions(lattice, pole, bearin
 def test_below_tau_a_tree_under_a_line_is_not_a_tower(lattice):
     x, y, z = (v.ravel() for v in np.meshgrid(np.arange(-6, 7), np.arange(-6, 7), np.arange(6, 15)))
     crown = lattice.voxels(np.column_stack([x, y, z])[np.hypot(x, y) < 6])
-    line = [lattice.wires(b, 17.0) for b in (80, 260)]
+    line = [lattice.conductors(b, 17.0) for b in (80, 260)]
     trunk = lattice.column(0, 0, 0, 17)
     around = lattice.together(lattice.ground(), trunk, crown, *line)
     assert detect(upper(trunk), around, probability=0.4) == []

@@ -17,13 +17,13 @@ from scenenet.models.model_file import write_model
 def test_the_time_is_the_median_over_samples_without_the_first_call():
     seen: dict[float, int] = {}
 
-    def answer(sample):
+    def predict(sample):
         calls = seen[sample.seconds] = seen.get(sample.seconds, 0) + 1
         time.sleep(0.2 if calls == 1 else sample.seconds)
         return np.zeros(1), np.zeros(1, bool)
 
     samples = [SimpleNamespace(seconds=s) for s in (0.005, 0.02, 0.06)]
-    took = milliseconds(answer, samples, repeats=3)
+    took = milliseconds(predict, samples, repeats=3)
     assert 20 <= took < 55
     assert list(seen.values()) == [4, 4, 4]
 

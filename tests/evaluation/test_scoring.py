@@ -37,16 +37,16 @@ class Mock(VoxelModel):
     kind = "mock"
     kernel_size = (1, 1, 1)
 
-    def __init__(self, *answers: dict[tuple[int, int, int], float]) -> None:
+    def __init__(self, *probabilities: dict[tuple[int, int, int], float]) -> None:
         super().__init__()
-        self.answers = iter(answers)
+        self.probabilities = iter(probabilities)
 
     def observer(self):
         raise NotImplementedError
 
     def forward(self, occupancy):
         volume = torch.zeros((1, *SHAPE))
-        for (z, y, x), probability in next(self.answers).items():
+        for (z, y, x), probability in next(self.probabilities).items():
             volume[0, z, y, x] = probability
         return volume
 
@@ -179,7 +179,7 @@ def test_detected_towers_count_whole_and_other_voxels_do_not():
     samples, crops = zip(crop(1, 5), strict=True)
     dataset = Dataset(list(samples), list(crops), "edp", [])
 
-    def answer(sample):
+    def predict(sample):
         volume = np.zeros(SHAPE, np.float32)
         for place, probability in half.items():
             volume[place] = probability
@@ -188,7 +188,7 @@ def test_detected_towers_count_whole_and_other_voxels_do_not():
         return volume.reshape(-1), truth
 
     def counted(**how):
-        return score_predictions("m", 0, 0.5, answer, dataset, LONE_POLES, **how)
+        return score_predictions("m", 0, 0.5, predict, dataset, LONE_POLES, **how)
 
     observer, towers = counted(), counted(whole_towers=True)
     assert observer.voxel == observer.voxel_observer == towers.voxel_observer

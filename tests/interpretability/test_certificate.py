@@ -64,8 +64,8 @@ def test_each_statement_has_its_number(field):
 def test_a_cnn_only_has_the_statements_of_a_convolution(card, tmp_path):
     path = tmp_path / "m.safetensors"
     write_model(path, CNN(kernel_size=(5, 5, 5)), card)
-    told = {s.property: s.holds for s in certificate(path).statements}
-    assert told == {
+    verified = {s.property: s.holds for s in certificate(path).statements}
+    assert verified == {
         "equivariant under translation by whole voxels": True,
         "equivariant under quarter turns about z": False,
     }
@@ -81,7 +81,7 @@ def test_it_is_reproducible_and_has_plain_values(field, card, tmp_path):
 
 
 def test_a_certificate_with_a_missing_number_is_refused(field):
-    told = field.to_json()
-    del told["half_voxel"]["mean_h"]
+    record = field.to_json()
+    del record["half_voxel"]["mean_h"]
     with pytest.raises(TypeError, match="mean_h"):
-        ModelCertificate.from_json(told)
+        ModelCertificate.from_json(record)

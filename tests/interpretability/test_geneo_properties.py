@@ -97,8 +97,8 @@ def test_the_measured_angles_do_not_depend_on_the_voxel_size():
 def brute_force(kernel: np.ndarray) -> float:
     """The largest difference of k * phi at the anchor over all pairs of phi in {0, 1}."""
     elements = kernel.reshape(-1)
-    answers = [np.dot(elements, phi) for phi in itertools.product((0, 1), repeat=len(elements))]
-    return max(answers) - min(answers)
+    responses = [np.dot(elements, phi) for phi in itertools.product((0, 1), repeat=len(elements))]
+    return max(responses) - min(responses)
 
 
 @pytest.mark.parametrize("size", [(1, 3, 3), (3, 2, 2)])

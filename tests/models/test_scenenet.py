@@ -33,7 +33,7 @@ def occupancy(*volumes: np.ndarray) -> Occupancy:
     return Occupancy.of_grids(indices, [np.ones(len(i)) for i in indices], volumes[0].shape)
 
 
-def answer(model, *volumes) -> torch.Tensor:
+def predicted(model, *volumes) -> torch.Tensor:
     with torch.no_grad():
         return model(occupancy(*volumes))
 
@@ -82,7 +82,7 @@ def test_numbers_are_drawn_from_the_ranges_of_the_kernels(seed):
     "make", [seeded, lambda s: CNN(generator=torch.Generator().manual_seed(s))]
 )
 def test_a_probability_lies_between_0_and_1(make):
-    probability = answer(make(1), volume(1), volume(2, share=0.9))
+    probability = predicted(make(1), volume(1), volume(2, share=0.9))
     assert probability.shape == (2, *ROOM)
     assert probability.min() >= 0
     assert probability.max() <= 1
@@ -90,7 +90,7 @@ def test_a_probability_lies_between_0_and_1(make):
 
 
 def test_an_empty_scene_has_no_tower():
-    assert answer(seeded(1), np.zeros(ROOM, bool)).max() == 0
+    assert predicted(seeded(1), np.zeros(ROOM, bool)).max() == 0
 
 
 def test_the_probability_is_tanh_and_relu_of_the_mixed_responses():
@@ -109,10 +109,10 @@ def test_contributions_are_mixing_weight_times_response():
         parts = model.contributions(scene)
         kernels, weights = model.kernels(), model.mixing_weights()
         dense = scene.dense(torch.float32)[:, None]
-        answers = torch.nn.functional.conv3d(dense, kernels[:, None], padding="same")[0]
+        responses = torch.nn.functional.conv3d(dense, kernels[:, None], padding="same")[0]
     assert parts.shape == (3, 1, *ROOM)
     torch.testing.assert_close(
-        parts[:, 0], weights[:, None, None, None] * answers, rtol=0, atol=EXACT
+        parts[:, 0], weights[:, None, None, None] * responses, rtol=0, atol=EXACT
     )
 
 
@@ -120,10 +120,10 @@ def test_the_cnn_is_torchs_conv3d_summed():
     model = CNN(3, (3, 5, 5), generator=torch.Generator().manual_seed(0))
     scene = occupancy(volume(5))
     with torch.no_grad():
-        answers = torch.nn.functional.conv3d(
+        responses = torch.nn.functional.conv3d(
             scene.dense(torch.float32)[:, None], model.weight[:, None], model.bias, padding="same"
         )
-        expected = answers.sum(dim=1).tanh().clamp(min=0)
+        expected = responses.sum(dim=1).tanh().clamp(min=0)
         torch.testing.assert_close(model(scene), expected, rtol=0, atol=EXACT)
 
 
@@ -132,23 +132,23 @@ def test_a_rotated_crop_gives_the_rotated_prediction(seed, size):
     model = seeded(seed, size)
     scene = volume(seed)
     turned = np.rot90(scene, axes=(1, 2))
-    expected = torch.rot90(answer(model, scene), dims=(2, 3))
-    torch.testing.assert_close(answer(model, turned), expected, rtol=0, atol=EXACT)
+    expected = torch.rot90(predicted(model, scene), dims=(2, 3))
+    torch.testing.assert_close(predicted(model, turned), expected, rtol=0, atol=EXACT)
 
 
 def test_a_crop_on_its_side_does_not_give_the_prediction_on_its_side():
     # Towers are vertical: only rotations about the vertical are a symmetry.
     scene = volume(7, (14, 14, 14))
-    expected = torch.rot90(answer(seeded(2), scene), dims=(1, 2))
-    on_its_side = answer(seeded(2), np.rot90(scene, axes=(0, 1)))
+    expected = torch.rot90(predicted(seeded(2), scene), dims=(1, 2))
+    on_its_side = predicted(seeded(2), np.rot90(scene, axes=(0, 1)))
     assert (on_its_side - expected).abs().max() > 0.1
 
 
 def test_an_untrained_cnn_is_not_equivariant_under_rotation():
     model = CNN(generator=torch.Generator().manual_seed(0))
     scene = volume(3)
-    turned = answer(model, np.rot90(scene, axes=(1, 2)))
-    assert (turned - torch.rot90(answer(model, scene), dims=(2, 3))).abs().max() > 0.01
+    turned = predicted(model, np.rot90(scene, axes=(1, 2)))
+    assert (turned - torch.rot90(predicted(model, scene), dims=(2, 3))).abs().max() > 0.01
 
 
 @given(st.integers(0, 1000), st.tuples(*[st.integers(0, 4)] * 3))
@@ -156,15 +156,15 @@ def test_a_translated_crop_gives_the_translated_prediction(seed, shift):
     model = seeded(seed, (5, 5, 5))
     room = np.zeros((22, 22, 22), bool)
     room[6:12, 6:12, 6:12] = volume(seed, (6, 6, 6), 0.2)
-    expected = torch.roll(answer(model, room), shift, dims=(1, 2, 3))
-    moved = answer(model, np.roll(room, shift, axis=(0, 1, 2)))
+    expected = torch.roll(predicted(model, room), shift, dims=(1, 2, 3))
+    moved = predicted(model, np.roll(room, shift, axis=(0, 1, 2)))
     torch.testing.assert_close(moved, expected, rtol=0, atol=EXACT)
 
 
 def test_order_of_the_batch_does_not_matter():
     model = seeded(1)
     one, two = volume(1), volume(2)
-    assert torch.equal(answer(model, one, two), answer(model, two, one).flip(0))
+    assert torch.equal(predicted(model, one, two), predicted(model, two, one).flip(0))
 
 
 def test_a_geneo_may_be_repeated():

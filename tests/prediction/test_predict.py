@@ -140,10 +140,10 @@ def test_conductors_are_listed_and_a_lone_pole_is_not_a_tower(scene, model, tmp_
     cloud = scene([(20.5, 31.5), (60.5, 31.5)], size=(81.0, 60.0), tree=None)
     s = np.arange(-28, 28, 0.2)
     x, y = POLE
-    wire = np.column_stack([np.full(len(s), x), y + s, 113.8 - s**2 / 1000])
+    conductor = np.column_stack([np.full(len(s), x), y + s, 113.8 - s**2 / 1000])
     line = PointCloud(
-        np.concatenate([cloud.xyz, wire]),
-        np.append(cloud.classification, np.full(len(wire), 16, np.uint8)),
+        np.concatenate([cloud.xyz, conductor]),
+        np.append(cloud.classification, np.full(len(conductor), 16, np.uint8)),
     )
     write_las(tmp_path / "line.laz", line)
     found = predict(tmp_path / "line.laz", model, tmp_path / "out", DetectionSettings())

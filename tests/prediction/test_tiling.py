@@ -168,15 +168,15 @@ def test_the_position_of_tiles_has_no_effect(tmp_path_factory, shift, seed):
     model = SceneNet(kernel_size=(5, 5, 5), generator=torch.Generator().manual_seed(seed))
     rng = np.random.default_rng(seed)
     xyz = rng.integers(-8, 8, (300, 3)) + 0.5  # centres of voxels around the corner of a tile
-    answers = []
+    predictions = []
     for moved in (xyz, xyz + np.array(shift)[::-1]):
         spool = spooled(tmp_path_factory.mktemp("tiles"), moved)
         found = {}
         for tile in spool.tiles():
             probability, _ = predict_tile(spool, tile, model, Card("presence"), 1)
             found |= dict(zip(map(tuple, tile.zyx().tolist()), probability.tolist(), strict=True))
-        answers.append(found)
-    here, there = answers
+        predictions.append(found)
+    here, there = predictions
     assert len(here) == len(there)
     for zyx, probability in here.items():
         assert there[tuple((np.array(zyx) + shift).tolist())] == pytest.approx(

@@ -31,7 +31,7 @@ def test_about_half_of_the_tower_labels_are_wrong_by_default(default):
     assert labelled[truth == TOWER].all(), "annotators miss no tower points"
     wrong_classes = truth[labelled & (truth != TOWER)]
     assert (wrong_classes == LOW).sum() > 500, "grass and scrub at the foot"
-    assert (wrong_classes == CONDUCTOR).sum() > 200, "and wire ends"
+    assert (wrong_classes == CONDUCTOR).sum() > 200, "and ends of conductors"
 
 
 @pytest.mark.parametrize(("kind", "ground_too"), [("lattice_pole", False), ("lattice", True)])

@@ -118,15 +118,15 @@ def test_conductors_run_from_tower_to_tower_above_the_ground(small):
     for stretch in list(corridor)[1:-1]:
         k = stretch.index
         before, after = corridor.line.support(k), corridor.line.support(k + 1)
-        wires = stretch.xyz[stretch.truth == CONDUCTOR]
-        wires = wires - [corridor.settings.easting, corridor.settings.northing, 0]
+        conductors = stretch.xyz[stretch.truth == CONDUCTOR]
+        conductors = conductors - [corridor.settings.easting, corridor.settings.northing, 0]
         for support in (before, after):
             for held in support.attachments:
-                assert np.linalg.norm(wires - held, axis=1).min() < 3.0
-        ground = corridor.terrain.height(wires[:, 0], wires[:, 1])
-        assert (wires[:, 2] - ground).min() > 4
+                assert np.linalg.norm(conductors - held, axis=1).min() < 3.0
+        ground = corridor.terrain.height(conductors[:, 0], conductors[:, 1])
+        assert (conductors[:, 2] - ground).min() > 4
         highest = max(before.attachments[:, 2].max(), after.attachments[:, 2].max())
-        assert wires[:, 2].max() < highest + 0.1
+        assert conductors[:, 2].max() < highest + 0.1
 
 
 def test_classes_are_edp_codes_with_the_bulk_where_the_thesis_has_it(default):

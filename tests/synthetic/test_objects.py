@@ -92,9 +92,9 @@ def test_conductors_bundles_and_earth_wires(bare, circuits, bundle, earth_wires)
     settings = bare(circuits=circuits, bundle=bundle, earth_wires=earth_wires, towers=2)
     tower = make_corridor(settings).line.support(1)
     assert len(tower.attachments) == 3 * circuits + earth_wires
-    wires = bundled(tower.attachments, tower.azimuth, bundle, 3 * circuits)
-    assert len(wires) == 3 * circuits * bundle + earth_wires
-    gap = np.linalg.norm(wires[:, None] - wires, axis=2) + 9 * np.eye(len(wires))
+    cables = bundled(tower.attachments, tower.azimuth, bundle, 3 * circuits)
+    assert len(cables) == 3 * circuits * bundle + earth_wires
+    gap = np.linalg.norm(cables[:, None] - cables, axis=2) + 9 * np.eye(len(cables))
     if bundle > 1:
         assert gap.min() == pytest.approx(BUNDLE_M)
     else:
@@ -102,7 +102,7 @@ def test_conductors_bundles_and_earth_wires(bare, circuits, bundle, earth_wires)
     sparse = corridor_cloud(bare(towers=2))[1]
     dense = corridor_cloud(settings)[1]
     ratio = (dense == CONDUCTOR).sum() / (sparse == CONDUCTOR).sum()
-    assert ratio == pytest.approx(len(wires) / 3, rel=0.15)
+    assert ratio == pytest.approx(len(cables) / 3, rel=0.15)
 
 
 def test_strays_lie_below_the_helicopter_on_one_side(bare):

@@ -194,13 +194,13 @@ def test_a_diverged_training_counts_as_dead_and_the_others_continue(crops, tmp_p
     lost = {"training.learning_rate": 1e30, "training.optimiser": "sgd", "training.epochs": 4}
     defined = study(variants=[{"name": "lost", "changes": lost}, {"name": "kept"}])
     table = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
-    gone = table[table["variant"] == "lost"]
+    diverged = table[table["variant"] == "lost"]
     assert len(table) == 4
-    assert gone["loss"].isna().all()
-    assert not gone["alive"].any()
-    assert (gone[["precision", "recall", "f05"]] == 0).all(axis=None)
-    assert gone["miou"].between(0.49, 0.5).all()
-    assert (gone["parameters"] == 11).all()
+    assert diverged["loss"].isna().all()
+    assert not diverged["alive"].any()
+    assert (diverged[["precision", "recall", "f05"]] == 0).all(axis=None)
+    assert diverged["miou"].between(0.49, 0.5).all()
+    assert (diverged["parameters"] == 11).all()
     assert table.loc[table["variant"] == "kept", "loss"].notna().all()
     lost_row, _ = summarise(defined, table, Thesis(source="s", numbers={})).to_dict("records")
     assert (lost_row["alive"], lost_row["f05"]) == (0, 0.0)

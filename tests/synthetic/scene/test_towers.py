@@ -25,8 +25,8 @@ def test_every_conductor_is_attached_to_the_tower(kind, circuits, earth_wires):
     tower = KINDS[kind](18.0, circuits, earth_wires)
     assert tower.attachments.shape == (3 * circuits + earth_wires, 3)
     ends = tower.members[:, :6].reshape(-1, 3)
-    for wire in tower.attachments:
-        assert np.linalg.norm(ends - wire, axis=1).min() < 0.3
+    for conductor in tower.attachments:
+        assert np.linalg.norm(ends - conductor, axis=1).min() < 0.3
     assert tower.attachments[:, 2].min() > 0.6 * 18.0
 
 
@@ -64,9 +64,9 @@ def test_arms_stand_across_the_line():
 def test_a_conductor_ends_at_its_attachments_and_hangs_below_the_chord(rise):
     start, end = np.array([5.0, 5.0, 40.0]), np.array([95.0, 125.0, 40.0 + rise])
     u = np.linspace(0, 1, 101)
-    wire = catenary(start, end, 1000.0, u)
-    np.testing.assert_allclose(wire[[0, -1]], [start, end], atol=1e-9)
-    below = (start + u[:, None] * (end - start) - wire)[:, 2]
+    conductor = catenary(start, end, 1000.0, u)
+    np.testing.assert_allclose(conductor[[0, -1]], [start, end], atol=1e-9)
+    below = (start + u[:, None] * (end - start) - conductor)[:, 2]
     assert (below[1:-1] > 0).all()
     assert below.max() == pytest.approx(150**2 / (8 * 1000), rel=0.05)
 

@@ -72,6 +72,13 @@ BODY_RADIUS = ShapeParameter(
 the mean width of 4.15 m (thesis 5.1.2) in voxels of about a metre, the size in a crop at 64^3."""
 
 
+def shell_sigma(meaning: str, sentence: Sentence) -> ShapeParameter:
+    """The tolerance sigma of a shell, whose ranges all kernels share."""
+    return ShapeParameter(
+        "sigma", 0.5, 3.0, "voxel^2", meaning, metric=(0.15, 2.25), sentence=sentence
+    )
+
+
 @dataclass(frozen=True)
 class Lattice:
     """The positions at which a kernel is sampled, in voxels or in metres.

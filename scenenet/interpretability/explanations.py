@@ -66,7 +66,7 @@ def _explanation(tower: SurveyTower, card: ModelCard) -> TowerExplanation:
 def _evidence(tower: SurveyTower) -> tuple[str, ...]:
     """The measurements of a tower, in words."""
     bearings = sorted(tower.conductor_bearings)
-    conductors = "no conductors are seen to leave it"
+    conductors = "no conductors were found that leave it"
     if bearings:
         towards = " and ".join(f"{bearing:.0f}°" for bearing in bearings)
         conductors = f"conductors leave its head at bearings of {towards} from north"

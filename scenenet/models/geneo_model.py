@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from scenenet.convolution.convolve import convolve
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
-from scenenet.geneo import ShapeParameter, kernel_named
+from scenenet.geneo import Lattice, ShapeParameter, kernel_named
 from scenenet.models.base import VoxelModel
 
 
@@ -143,6 +143,15 @@ class GeneoModel(VoxelModel):
         """Set what ``numbers`` returns."""
         for parameter, value in zip(self.parameters(), numbers, strict=True):
             parameter.data.fill_(float(value))
+
+    def _sampled(self, lattice: Lattice) -> Tensor:
+        """The kernels on ``lattice``, (K, kz, ky, kx)."""
+        return torch.stack(
+            [
+                kernel_named(geneo).sample(lattice, self.shape_of(name))
+                for name, geneo in zip(self.names, self.geneos, strict=True)
+            ]
+        )
 
     def _stored_shape(self, name: str) -> nn.ParameterDict:
         return cast(nn.ParameterDict, self.shapes[name])

@@ -16,7 +16,7 @@ from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.convolution.cross_section import neighbours, section_offsets, strongest, whole_voxels
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
-from scenenet.geneo import Lattice, ShapeParameter, kernel_named
+from scenenet.geneo import Lattice, ShapeParameter
 from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.models.geneo_model import GeneoModel
@@ -151,17 +151,11 @@ class MetricSceneNet(GeneoModel):
 
     def kernels(self) -> Tensor:
         lattice = Lattice.of_extent(self.kernel_size, self.metric.radius, self.voxel_size)
-        sampled = torch.stack(
-            [
-                kernel_named(geneo).sample(lattice, self.shape_of(name))
-                for name, geneo in zip(self.names, self.geneos, strict=True)
-            ]
-        )
         ends = (lattice.z >= -self.metric.below * (1 + 1e-6)) & (
             lattice.z <= self.metric.above * (1 + 1e-6)
         )
         assert lattice.inside is not None
-        return sampled * lattice.inside * ends * (self.voxel_size / COLUMN_M)
+        return self._sampled(lattice) * lattice.inside * ends * (self.voxel_size / COLUMN_M)
 
     def unit_of(self, parameter: ShapeParameter) -> str:
         return parameter.metric_unit

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import torch
 from torch import Tensor
 
-from scenenet.geneo import Lattice, ShapeParameter, kernel_named
+from scenenet.geneo import Lattice, ShapeParameter
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.settings import THESIS_GENEOS, KernelSize
 
@@ -54,13 +54,7 @@ class SceneNet(GeneoModel):
         return torch.stack([*free, last])
 
     def kernels(self) -> Tensor:
-        lattice = Lattice.of_size(self.kernel_size)
-        return torch.stack(
-            [
-                kernel_named(geneo).sample(lattice, self.shape_of(name))
-                for name, geneo in zip(self.names, self.geneos, strict=True)
-            ]
-        )
+        return self._sampled(Lattice.of_size(self.kernel_size))
 
     def unit_of(self, parameter: ShapeParameter) -> str:
         return parameter.unit

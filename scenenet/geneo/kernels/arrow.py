@@ -14,6 +14,7 @@ from scenenet.geneo.kernel import (
     Lattice,
     ShapeParameter,
     gaussian_shell,
+    shell_sigma,
     zero_sum,
 )
 from scenenet.geneo.registry import register
@@ -65,15 +66,7 @@ class Arrow(GeneoKernel):
     sums_to_zero = True
     parameters = (
         BODY_RADIUS,
-        ShapeParameter(
-            "sigma",
-            0.5,
-            3.0,
-            "voxel^2",
-            "tolerance around both radii",
-            metric=(0.15, 2.25),
-            sentence=_head_sigma,
-        ),
+        shell_sigma("tolerance around both radii", _head_sigma),
         ShapeParameter(
             "r_c",
             0.5,

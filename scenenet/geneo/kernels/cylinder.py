@@ -10,8 +10,8 @@ from scenenet.geneo.kernel import (
     BODY_RADIUS,
     GeneoKernel,
     Lattice,
-    ShapeParameter,
     gaussian_shell,
+    shell_sigma,
     zero_sum,
 )
 from scenenet.geneo.registry import register
@@ -30,15 +30,7 @@ class Cylinder(GeneoKernel):
     sums_to_zero = True
     parameters = (
         BODY_RADIUS,
-        ShapeParameter(
-            "sigma",
-            0.5,
-            3.0,
-            "voxel^2",
-            "tolerance around that radius",
-            metric=(0.15, 2.25),
-            sentence=_body_sigma,
-        ),
+        shell_sigma("tolerance around that radius", _body_sigma),
     )
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:

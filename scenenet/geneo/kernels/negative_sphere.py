@@ -7,7 +7,13 @@ from collections.abc import Mapping
 
 from torch import Tensor
 
-from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, gaussian_shell
+from scenenet.geneo.kernel import (
+    GeneoKernel,
+    Lattice,
+    ShapeParameter,
+    gaussian_shell,
+    shell_sigma,
+)
 from scenenet.geneo.registry import register
 from scenenet.geneo.sentences import Numbers, Reference, m, shell_width
 
@@ -46,15 +52,7 @@ class NegativeSphere(GeneoKernel):
             metric=(0.1, 1.5),
             sentence=_crown_radius,
         ),
-        ShapeParameter(
-            "sigma",
-            0.5,
-            3.0,
-            "voxel^2",
-            "tolerance around that radius",
-            metric=(0.15, 2.25),
-            sentence=_crown_sigma,
-        ),
+        shell_sigma("tolerance around that radius", _crown_sigma),
         ShapeParameter(
             "omega",
             0.05,

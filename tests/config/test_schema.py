@@ -96,7 +96,11 @@ def test_an_unknown_key_is_refused_with_the_known_ones():
         ({"voxels": {"resolution": 63}}, "voxels.resolution: 63 is not allowed"),
         ({"training": {"loss": {"alpha": -1}}}, "training.loss.alpha: -1 is not allowed"),
         ({"split": {"train": 0.5}}, "split: train, validation and test must sum to 1"),
-        ({"towers": 3}, "towers: is 3, but groups the settings eps, min_points, cell"),
+        (
+            {"towers": 3},
+            "towers: is 3, but groups the settings eps, min_points, sparse_points, "
+            "sparse_height, cell",
+        ),
         ({"seeds": [0, 0]}, "seeds: 0 is listed more than once"),
         ({"seeds": []}, "seeds: [] is not allowed"),
         ({"predict": {"model": "best"}}, "'best' is not one of the models: scenenet, cnn"),

@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 
 from scenenet.cli.inputs import Failures
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, in_file, warn
 from scenenet.core.scratch import scratch_folder
+from scenenet.core.unchanged import unchanged
 from scenenet.dataset.crops import CropSettings, cut_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.split import SplitSettings, split_crops
@@ -27,6 +28,7 @@ from scenenet.models.model_file import read_model, write_model
 from scenenet.models.predictions import probabilities
 from scenenet.models.settings import ModelSettings, TuningSettings
 from scenenet.pointcloud import survey_in_metres
+from scenenet.pointcloud.quality.screening import survey_warnings
 from scenenet.pointcloud.ts40k import sample_files
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
@@ -46,6 +48,7 @@ class LabelledFiles:
         read: the files that could be read.
         skipped: files or samples without a crop, and labelled points that are no tower, with the
             reason.
+        warnings: what looks wrong about the files, as sentences that begin with the path.
     """
 
     dataset: Dataset = field(default_factory=lambda: Dataset([], [], "", []))
@@ -54,6 +57,7 @@ class LabelledFiles:
     survey_crops: set[str] = field(default_factory=set)
     read: list[Path] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
 
 
 def read_labelled(
@@ -80,7 +84,7 @@ def read_labelled(
                 continue
             # The number keeps files of the same name in different folders apart.
             name = path.stem if len(paths) == 1 else f"{number}-{path.stem}"
-            with failures.collect():
+            with failures.collect(), unchanged(path), in_file(path):
                 folder = scratch / f"{number}"
                 manifests.append(_read_file(path, name, codes, grid, folder, files))
         dataset = load([voxels for _, voxels in manifests])
@@ -109,6 +113,9 @@ def _read_file(
     Returns:
         the manifests of its crops and of their grids, in ``folder``.
     """
+    warnings = survey_warnings(path, codes)
+    warn(path, warnings)
+    files.warnings.extend(f"{path}: {text}" for text in warnings)
     found = survey_towers(path, codes, TowerSettings())
     files.skipped.extend({"sample": path.name, "reason": note} for note in found.notes())
     crops, voxels = folder / "crops.json", folder / "voxels.json"
@@ -147,7 +154,8 @@ def train_files(
             training crops. The scores are then too high, and ``tuned_on`` is ``training``.
 
     Returns:
-        the scores of each seed, the chosen seed, the numbers of crops, and the skipped files.
+        the scores of each seed, the chosen seed, the numbers of crops, the skipped files,
+        and what looks wrong about the files.
 
     Raises:
         InputError: no file has a labelled tower.
@@ -183,6 +191,7 @@ def train_files(
         ],
         "crops": {"training": len(training), "validation": len(kept)},
         "skipped": files.skipped,
+        "warnings": files.warnings,
     }
 
 
@@ -202,7 +211,7 @@ def evaluate_files(
             false towers everywhere count, also in surveys without towers.
 
     Returns:
-        the evaluation as plain values, with ``skipped``.
+        the evaluation as plain values, with ``skipped`` and ``warnings``.
 
     Raises:
         InputError: the model cannot be used, or no file has a crop or survey to score.
@@ -226,7 +235,7 @@ def evaluate_files(
             with failures.collect():
                 match += _survey_towers(survey, towers, model, detection)
         result = replace(result, towers=TowerScores.of(match))
-    return result.to_json() | {"skipped": files.skipped}
+    return result.to_json() | {"skipped": files.skipped, "warnings": files.warnings}
 
 
 def _survey_towers(

@@ -1,4 +1,4 @@
-"""The errors that users of the package see: what went wrong, where, and what to do."""
+"""The errors and warnings that users of the package see: what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import contextlib
 import errno
 import os
 import shutil
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 
@@ -50,6 +51,27 @@ def _rebuild(
     kind: type[InputError], problem: str, file: str | None, place: str | None, remedy: str | None
 ) -> InputError:
     return kind(problem, file=file, place=place, remedy=remedy)
+
+
+@contextlib.contextmanager
+def in_file(file: str | Path | None = None, place: str | None = None) -> Iterator[None]:
+    """Name the file and the place in an ``InputError`` of the block that does not name them: code
+    that works on points does not know where they come from."""
+    try:
+        yield
+    except InputError as error:
+        raise type(error)(
+            error.problem,
+            file=error.file or file,
+            place=error.place or place,
+            remedy=error.remedy,
+        ) from error
+
+
+def warn(file: str | Path, warnings: Iterable[str]) -> None:
+    """Print what looks wrong about a file on stderr, a line each."""
+    for warning in warnings:
+        print(f"warning: {file}: {warning}", file=sys.stderr)
 
 
 _STORAGE = {

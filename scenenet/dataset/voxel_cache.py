@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, in_file
 from scenenet.core.progress import track
 from scenenet.dataset.crops import Crop, crop_of, read_crops
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, VoxelSettings, voxelise
@@ -42,7 +42,8 @@ def build(
     with create(store, manifest, facts) as writer:
         for crop, cloud in track(read_crops(crops), label, total=len(entries)):
             begin = time.perf_counter()
-            sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id)
+            with in_file(place=f"crop {crop.id}"):
+                sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id)
             seconds = time.perf_counter() - begin
             arrays = {"index": sample.index, "count": sample.count, "tower": sample.tower}
             writer.add(crop.id, arrays)

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.core.errors import InputError
+from scenenet.core.unchanged import FileState, unchanged
 from scenenet.pointcloud.file_kinds import kind_of
 from scenenet.pointcloud.las.extra_dimensions import OWN_MARK, Dimension, checked, new_dimensions
-from scenenet.pointcloud.las.header import CheckedHeader, read_header
+from scenenet.pointcloud.las.header import CheckedHeader, Vlr, read_header
 from scenenet.pointcloud.las.records import coordinates, iter_records
 from scenenet.pointcloud.las.writing import NO_DATE, open_writer, write_cloud
 from scenenet.pointcloud.reading import read
@@ -37,14 +38,18 @@ Values = Callable[[np.ndarray], Mapping[str, np.ndarray]]
 
 
 def add_dimensions(
-    source: str | Path, target: str | Path, names: Mapping[str, Dimension], values: Values
+    source: str | Path,
+    target: str | Path,
+    names: Mapping[str, Dimension],
+    values: Values,
+    state: FileState | None = None,
 ) -> int:
     """Write a copy of a survey, with all of its points and content, and further dimensions.
 
-    Points keep their order, stored integers, scale and offset and all other dimensions; variable
-    length records and CRS are copied. Dimensions that an earlier call added (their description
-    says ``scenenet``) are replaced. Memory is bounded by a chunk. A COPC survey is written as plain
-    LAZ, in the order of its file.
+    Points keep their order, stored integers, scale and offset and all other dimensions; the CRS and
+    the bytes of variable length records, extended ones too, are copied. Dimensions that an earlier
+    call added (their description says ``scenenet``) are replaced. Memory is bounded by a chunk. A
+    COPC survey is written as plain LAZ, in the order of its file.
 
     Args:
         source: the survey: LAS, LAZ, COPC, or a .npy / .pt sample (written as ``write_las`` does).
@@ -52,34 +57,40 @@ def add_dimensions(
         names: name -> numpy type, or (type, description of up to 22 characters).
         values: gets (n, 3) float64 coordinates of consecutive points, returns (n,) numbers for
             each name.
+        state: of the survey when ``values`` was made; None for now. Another state is an error,
+            and ``target`` stays as it was.
 
     Returns:
         the number of points.
 
     Raises:
         InputError: the survey cannot be read, has a dimension of the same name that another
-            program wrote, has waveforms that cannot be kept, or has no room for more dimensions.
+            program wrote, has waveforms that cannot be kept, has no room for more dimensions, or
+            changes while it is read.
         ValueError: ``values`` did not return an array for each of ``names``.
     """
     source, target = Path(source), Path(target)
+    state = state or FileState.of(source)
     dimensions = new_dimensions(names, own=True)
-    if kind_of(source) != "las":
-        cloud = read(source)
-        arrays = checked(values(cloud.xyz), dimensions, len(cloud))
+    with unchanged(state):
+        kind = kind_of(source)
+    if kind != "las":
+        with unchanged(state):
+            cloud = read(source)
+            arrays = checked(values(cloud.xyz), dimensions, len(cloud))
         write_cloud(target, cloud, dimensions, arrays, 0.001)
         return len(cloud)
-    header = read_header(source)
+    with unchanged(state):
+        header = read_header(source)
     channels: set[int] = set()
-    with open_writer(target, _extended(header, dimensions)) as writer:
+    with open_writer(target, _extended(header, dimensions)) as writer, unchanged(state):
         for records in iter_records(header, CHUNK_POINTS):
             if writer.header.point_format.id in MIXED_UP_FORMATS:
                 channels.update(np.unique(records["scanner_channel"]).tolist())
                 _check_channels(source, channels, writer.header.are_points_compressed)
             arrays = checked(values(coordinates(records)), dimensions, len(records))
             writer.write_points(_widened(records, writer.header, arrays))
-        if header.las.evlrs:
-            kept = [e for e in header.las.evlrs if not _is_octree(header, e.user_id)]
-            writer.write_evlrs(type(header.las.evlrs)(kept))
+        _write_evlrs(writer, header)
     return header.las.point_count
 
 
@@ -134,9 +145,8 @@ def _extended(header: CheckedHeader, dimensions: list[laspy.ExtraBytesParams]) -
             file=header.path,
             remedy="Remove extra dimensions first (pdal translate --writers.las.extra_dims)",
         )
-    # From the bytes of the file: laspy changes some records when it writes them.
     new.vlrs = [
-        laspy.VLR(v.user_id, v.record_id, v.description, v.data)
+        _as_stored(v)
         for v in header.vlrs
         if (v.user_id, v.record_id) not in REWRITTEN and not _is_octree(header, v.user_id)
     ]
@@ -153,6 +163,21 @@ def _extended(header: CheckedHeader, dimensions: list[laspy.ExtraBytesParams]) -
         least = dims.preferred_file_version_for_point_format(new.point_format.id)
         new.version = max(version.from_str(least), version(1, min(new.version.minor, 4)))
     return new
+
+
+def _write_evlrs(writer: laspy.LasWriter, header: CheckedHeader) -> None:
+    from laspy.vlrs.vlrlist import VLRList
+
+    kept = [_as_stored(e) for e in header.evlrs if not _is_octree(header, e.user_id)]
+    if kept:
+        writer.write_evlrs(VLRList(kept))
+
+
+def _as_stored(record: Vlr) -> laspy.VLR:
+    """A record with the bytes of the file: laspy changes those that it understands."""
+    import laspy
+
+    return laspy.VLR(record.user_id, record.record_id, record.description, record.data)
 
 
 def _is_own(dimension: laspy.DimensionInfo) -> bool:

@@ -247,6 +247,37 @@ def class_scheme(name: str) -> ClassScheme:
         ) from None
 
 
+MISFIT_FACTOR = 20
+"""A scheme is doubted if another one finds this many times as many conductor points."""
+
+
+def misfit(scheme: ClassScheme, counts: np.ndarray) -> str | None:
+    """Why the codes of a survey look like those of another scheme, as a sentence; else None.
+
+    Schemes with the same code for towers differ in the codes of conductors, and a labelled survey
+    with towers has conductors.
+
+    Args:
+        scheme: the scheme that the user named.
+        counts: (256,) points of each code.
+    """
+    own = int(counts[list(scheme.with_role("conductor"))].sum())
+    for other in SCHEMES.values():
+        if other is scheme or other.tower != scheme.tower:
+            continue
+        conductors = other.with_role("conductor")
+        if counts[list(conductors)].sum() < MISFIT_FACTOR * (own + 1):
+            continue
+        code = max(conductors, key=lambda code: counts[code])
+        return (
+            f"the class codes look like those of scheme {other.name}, not {scheme.name}: code "
+            f"{code} ({counts[code]} points) is {other.class_name(code)!r} in {other.name} but "
+            f"{scheme.class_name(code)!r} in {scheme.name}, where conductors have the code "
+            f"{_listed(scheme.with_role('conductor'))} ({own} points)"
+        )
+    return None
+
+
 def difference() -> str:
     """How the schemes differ, in one line: the codes of towers and conductors in each."""
     return "; ".join(

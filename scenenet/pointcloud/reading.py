@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import class_scheme
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.file_kinds import kind_of
-from scenenet.pointcloud.las.crs import read_crs, unit_in_metres
+from scenenet.pointcloud.las.crs import CrsRecord, read_crs
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
 from scenenet.pointcloud.ts40k import read_sample
+from scenenet.pointcloud.units import NotMetres, not_metres
 
 if TYPE_CHECKING:
     import pyproj
@@ -36,8 +36,7 @@ class SurveyInfo:
         n_points: number of points; the file is large enough for them.
         mins, maxs: bounding box (x, y, z): for LAS the one in the header, which may be wrong, for
             .npy and .pt that of the points. NaN without points.
-        crs: coordinate reference system; None if the file names none, or one that is not
-            understood.
+        record: what the file states about its coordinates.
         scales: step of the stored coordinates (x, y, z); None for .npy and .pt.
         extra_dimensions: names of the dimensions beyond those of the point format.
         warnings: defects of the header that do not prevent reading the points.
@@ -50,10 +49,21 @@ class SurveyInfo:
     n_points: int
     mins: tuple[float, float, float]
     maxs: tuple[float, float, float]
-    crs: pyproj.CRS | None
+    record: CrsRecord
     scales: tuple[float, float, float] | None
     extra_dimensions: tuple[str, ...]
     warnings: tuple[str, ...]
+
+    @property
+    def crs(self) -> pyproj.CRS | None:
+        """The coordinate reference system; None if the file names none that is understood."""
+        return self.record.crs
+
+    @property
+    def not_metres(self) -> NotMetres | None:
+        """Why the coordinates are known not to be metres, else None."""
+        box = (self.mins, self.maxs) if self.n_points else ((np.nan,) * 3, (np.nan,) * 3)
+        return not_metres(self.record, *box, self.scales)
 
 
 def survey_info(path: str | Path) -> SurveyInfo:
@@ -69,11 +79,11 @@ def survey_info(path: str | Path) -> SurveyInfo:
         mins, maxs = (xyz.min(0), xyz.max(0)) if len(xyz) else (np.full(3, np.nan),) * 2
         return SurveyInfo(
             path=path, format=kind, version=None, point_format=None, n_points=len(xyz),
-            mins=_triple(mins), maxs=_triple(maxs), crs=None, scales=None, extra_dimensions=(),
-            warnings=(),
+            mins=_triple(mins), maxs=_triple(maxs), record=CrsRecord(), scales=None,
+            extra_dimensions=(), warnings=(),
         )  # fmt: skip
     header = read_header(path)
-    las, record = header.las, read_crs(header.las)
+    las, record = header.las, read_crs(header.records)
     return SurveyInfo(
         path=path,
         format=header.format,
@@ -82,35 +92,24 @@ def survey_info(path: str | Path) -> SurveyInfo:
         n_points=header.las.point_count,
         mins=_triple(las.mins),
         maxs=_triple(las.maxs),
-        crs=record.crs,
+        record=record,
         scales=_triple(las.scales),
         extra_dimensions=tuple(las.point_format.extra_dimension_names),
-        warnings=header.warnings if record.problem is None else (*header.warnings, record.problem),
+        warnings=(*header.warnings, *record.problems),
     )
 
 
 def survey_in_metres(path: str | Path) -> SurveyInfo:
     """The header of a survey whose coordinates are in metres, or whose unit is unknown.
 
-    Voxels, kernels and towers have sizes in metres, so degrees and feet are refused.
+    Voxels, kernels and towers have sizes in metres, so other units are refused, on any axis.
 
     Raises:
-        InputError: as ``survey_info``, and if the coordinates are known to have another unit.
+        InputError: as ``survey_info``, and if the coordinates are known not to be metres.
     """
     info = survey_info(path)
-    unit = unit_in_metres(info.crs)
-    # Only what the file states: small numbers without a CRS may be a local system in metres;
-    # ``check`` warns about them.
-    degrees = info.crs is not None and info.crs.is_geographic
-    if degrees or unit not in (None, 1.0):
-        raise InputError(
-            "the coordinates are in degrees"
-            if degrees
-            else f"the unit of the coordinates is {unit:g} m, not 1 m",
-            file=path,
-            place=f"CRS {info.crs.name}" if info.crs else None,
-            remedy="Reproject it to metres first (pdal translate --filter filters.reprojection)",
-        )
+    if reason := info.not_metres:
+        raise reason.error(path)
     return info
 
 
@@ -142,7 +141,7 @@ def iter_chunks(
         parts = (slice(at, at + chunk_points) for at in range(0, len(xyz), chunk_points))
         return (PointCloud(xyz[part], classes[part], scheme) for part in parts)
     header = read_header(path)
-    crs = read_crs(header.las).crs
+    crs = read_crs(header.records).crs
     chunks = iter_records(header, chunk_points, places_only=True)
     return (PointCloud(coordinates(c), class_codes(c), scheme, crs) for c in chunks)
 

@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenenet.core.errors import in_file
 from scenenet.core.progress import track
 from scenenet.core.scratch import scratch_folder
+from scenenet.core.unchanged import FileState, unchanged
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.pointcloud import iter_chunks, survey_in_metres
+from scenenet.pointcloud.quality.screening import Screening
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.tile_predictions import PointPredictions, TilePredictions
 from scenenet.prediction.tiling import TileSpool
@@ -33,6 +36,8 @@ class SurveyPrediction:
 
     Attributes:
         survey: the file of the survey.
+        state: its state before the first pass; a later pass must find the same.
+        warnings: what looks wrong about it, as sentences.
         model, card: the model and what its file says about it.
         settings, detection: the settings of the prediction.
         crs: CRS of the survey; None where the file names none.
@@ -44,6 +49,8 @@ class SurveyPrediction:
     """
 
     survey: Path
+    state: FileState
+    warnings: tuple[str, ...]
     model: VoxelModel
     card: ModelCard
     settings: PredictSettings
@@ -98,24 +105,31 @@ def predict_survey(
     tau = card.threshold()  # fail before the work: without tau there is no tower
     geneos = trained.names if isinstance(trained, GeneoModel) else []
     voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
-    name, crs = Path(survey).name, survey_in_metres(survey).crs
+    state = FileState.of(survey)
+    name, info = Path(survey).name, survey_in_metres(survey)
+    screening = Screening(info)
     with scratch_folder() as scratch:
         spool = TileSpool(scratch, voxel_size)
         n_points = 0
         chunks = iter_chunks(survey, chunk_points=settings.chunk_points)
-        for chunk in track(chunks, f"{name}: chunks read"):
-            spool.add(chunk.xyz)
-            n_points += len(chunk)
+        with unchanged(state), in_file(survey):
+            for chunk in track(chunks, f"{name}: chunks read"):
+                screening.add(chunk.xyz, chunk.classification)
+                spool.add(chunk.xyz)
+                n_points += len(chunk)
+        screening.raise_if_not_metres()
         tiles = TilePredictions(spool, scratch, geneos)
         tiles.compute(trained, card, f"{name}: tiles predicted")
         towers = tuple(tiles.find_towers(tau, detection))
         yield SurveyPrediction(
             survey=Path(survey),
+            state=state,
+            warnings=screening.warnings(),
             model=trained,
             card=card,
             settings=settings,
             detection=detection,
-            crs=crs,
+            crs=info.crs,
             n_points=n_points,
             n_tiles=len(spool),
             voxel_size=voxel_size,

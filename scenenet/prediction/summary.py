@@ -24,6 +24,7 @@ class PredictionSummary:
         kernel_size: (kz, ky, kx) in voxels.
         tiles: number of tiles that hold a point.
         crs: CRS of the survey; None where the file names none.
+        warnings: what looks wrong about the survey, as sentences.
         seconds: time of the prediction, files included, s.
         settings: settings of the prediction, with those of ``detection``.
         model_provenance: provenance of the model.
@@ -40,6 +41,7 @@ class PredictionSummary:
     kernel_size: list[int]
     tiles: int
     crs: str | None
+    warnings: list[str]
     seconds: float
     settings: dict[str, Any]
     model_provenance: dict[str, Any]

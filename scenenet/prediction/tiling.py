@@ -18,6 +18,11 @@ from scenenet.core.errors import InputError
 EDGE = 64
 """Voxels along the edge of a tile; a tile and its halo fit into a processor's cache."""
 
+BORDER_M = 2.0**-21
+"""A point this close below the border of a voxel, 0.5 micrometre, belongs to the voxel above. A
+border is often a multiple of the steps of a file, and the sum of offset and steps then lands on
+either side of it by rounding, so that another offset of the same survey would move the point."""
+
 _BITS = 21
 _BIAS = 1 << (_BITS - 1)
 _SPOOLED = np.dtype([("voxel", "<i4"), ("count", "<i4")])
@@ -78,7 +83,7 @@ class TileSpool:
         Raises:
             InputError: a coordinate is outside the lattice.
         """
-        steps = np.floor(xyz[:, ::-1] / self.voxel_size)
+        steps = np.floor((xyz[:, ::-1] + BORDER_M) / self.voxel_size)
         if not (np.abs(steps) < _BIAS * EDGE).all():
             row = int(np.argmax(~(np.abs(steps) < _BIAS * EDGE).all(axis=1)))
             raise InputError(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, warn
 from scenenet.core.files import atomic, read_json, write_json
 from scenenet.core.outputs import Output
 from scenenet.core.provenance import fingerprint
@@ -103,6 +103,7 @@ def predict_to_files(
         atomic(files.towers) as towers,
         atomic(files.summary) as record,
     ):
+        warn(survey, prediction.warnings)
         write_points(prediction, points)
         write_json(towers, tower_collection(prediction.towers, prediction.crs))
         outputs = {
@@ -128,7 +129,7 @@ def write_points(prediction: SurveyPrediction, out: str | Path) -> None:
     """Write every point of the survey back, in order, with ``point_dimensions`` added.
 
     Raises:
-        InputError: the survey changed after it was read.
+        InputError: the survey changed after it was read; ``out`` stays as it was.
     """
 
     def values(xyz: np.ndarray) -> dict[str, np.ndarray]:
@@ -138,14 +139,7 @@ def write_points(prediction: SurveyPrediction, out: str | Path) -> None:
         return {PROBABILITY: points.probability, TOWER_ID: points.tower_id} | named
 
     dimensions = point_dimensions(prediction.geneos)
-    written = add_dimensions(prediction.survey, out, dimensions, values)
-    if written != prediction.n_points:
-        Path(out).unlink()
-        raise InputError(
-            f"the first pass read {prediction.n_points} points, the second pass {written}",
-            file=prediction.survey,
-            remedy="The file changed in between; predict it again when no program writes to it",
-        )
+    add_dimensions(prediction.survey, out, dimensions, values, prediction.state)
 
 
 def tower_collection(towers: Iterable[SurveyTower], crs: pyproj.CRS | None) -> dict[str, Any]:
@@ -173,6 +167,7 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         kernel_size=list(prediction.model.kernel_size),
         tiles=prediction.n_tiles,
         crs=None if crs is None else crs.to_string(),
+        warnings=list(prediction.warnings),
         seconds=time.perf_counter() - prediction.started,
         settings=prediction.settings.model_dump() | detection,
         model_provenance=prediction.card.provenance,

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from scenenet.core.errors import warn
 from scenenet.core.files import write_text
 from scenenet.core.progress import track
 from scenenet.core.scratch import scratch_folder
+from scenenet.core.unchanged import unchanged
 from scenenet.detection.settings import DetectionSettings
 from scenenet.figures import Picture
 from scenenet.figures.plots.point_clouds import View, side_views
@@ -54,9 +56,11 @@ def explain_survey(
         InputError: the survey or the model cannot be used.
     """
     with predict_survey(survey, model, settings, detection) as prediction:
+        warn(survey, prediction.warnings)
         card = prediction.card
         explained = explanations(prediction.towers, card)
-        surroundings = list(_surroundings(prediction, explained))
+        with unchanged(prediction.state):
+            surroundings = list(_surroundings(prediction, explained))
     facts = [
         ("points", write(prediction.n_points, "count")),
         ("towers", write(len(explained), "count")),

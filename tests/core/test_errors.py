@@ -6,7 +6,7 @@ import pickle
 
 import pytest
 
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, in_file, warn
 
 
 @pytest.mark.parametrize(
@@ -31,3 +31,17 @@ def test_an_error_can_be_sent_between_processes():
     copy = pickle.loads(pickle.dumps(error))
     assert str(copy) == str(error)
     assert (copy.file, copy.place, copy.remedy) == ("a.laz", "row 3", "Fill it")
+
+
+def test_a_file_and_a_place_are_added_where_they_are_missing():
+    with pytest.raises(InputError) as caught, in_file("a.laz"), in_file(place="crop 1"):
+        raise InputError("too far out", remedy="Remove it")
+    assert str(caught.value) == "a.laz: crop 1: too far out. Remove it"
+    with pytest.raises(InputError) as caught, in_file("a.laz", "crop 1"):
+        raise InputError("too far out", file="b.laz", place="row 2")
+    assert str(caught.value) == "b.laz: row 2: too far out"
+
+
+def test_warnings_name_their_file_on_stderr(capsys):
+    warn("a.laz", ["odd", "very odd"])
+    assert capsys.readouterr() == ("", "warning: a.laz: odd\nwarning: a.laz: very odd\n")

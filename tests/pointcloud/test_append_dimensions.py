@@ -10,6 +10,7 @@ import pyproj
 import pytest
 
 from scenenet.core.errors import InputError
+from scenenet.core.unchanged import FileState
 from scenenet.pointcloud import PointCloud, add_dimensions, read, survey_info, write_las
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import iter_records
@@ -121,6 +122,55 @@ def test_extended_records_are_kept(make_las, tmp_path):
     add_dimensions(source, target, NAMES, values)
     assert laspy.read(target).evlrs[0].record_data == evlrs[0].record_data
     assert_same_for_laspy(source, target)
+
+
+def test_extended_records_that_laspy_interprets_come_back_as_bytes(make_las, tmp_path):
+    """Class names in fields of 15 bytes, which a writer need not pad with zeros."""
+    source, target = make_las("in.laz"), tmp_path / "out.laz"
+    names = [(2, b"ground (bare)\0X"), (15, b"tower (noise?)!"), (18, b"high\0(noisy)\0rest")]
+    lookup = b"".join(struct.pack("<B15s", code, name) for code, name in names)
+    data = bytearray(source.read_bytes())
+    struct.pack_into("<QI", data, 235, len(data), 2)
+    for user, number, content in ((b"LASF_Spec", 0, lookup), (b"LASF_Spec", 3, b"text\0\1\2")):
+        data += struct.pack("<2x16sHQ32s", user, number, len(content), b"names") + content
+    source.write_bytes(data)
+    before = read_header(source).evlrs
+    assert before[0].data == lookup
+    add_dimensions(source, target, NAMES, values)
+    assert read_header(target).evlrs == before
+    assert_same_for_laspy(source, target)
+
+
+@pytest.mark.parametrize("how", ["replaced", "overwritten", "removed"])
+@pytest.mark.parametrize("name", ["in.las", "in.laz", "in.npy"])
+def test_a_survey_that_changes_meanwhile_leaves_the_earlier_result(make_las, tmp_path, name, how):
+    source, target = tmp_path / name, tmp_path / "out.laz"
+    if source.suffix == ".npy":
+        other = tmp_path / "other.npy"
+        np.save(source, np.ones((100, 4)))
+        np.save(other, np.zeros((100, 4)))
+    else:
+        other = make_las(f"other{source.suffix}", seed=1)
+        make_las(name)
+    target.write_bytes(b"the earlier result")
+    state = FileState.of(source)
+
+    def change(xyz):
+        if how == "removed":
+            source.unlink(missing_ok=True)
+        elif how == "replaced" and other.exists():
+            other.replace(source)
+        elif how == "overwritten" and other.exists():
+            source.write_bytes(other.read_bytes())
+            other.unlink()
+        raise IndexError("what a look-up of other points raises")
+
+    for change_when, act in (("during", change), ("before", values)):
+        with pytest.raises(InputError, match=r"changed, replaced or removed") as caught:
+            add_dimensions(source, target, NAMES, act, state)
+        assert name in str(caught.value), change_when
+        assert target.read_bytes() == b"the earlier result"
+        assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
 def test_undescribed_extra_bytes_are_kept(make_las, tmp_path, patched):

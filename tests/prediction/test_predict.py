@@ -25,6 +25,7 @@ from scenenet.prediction.writers import PredictionFiles, predict_to_files
 from scenenet.training.train import fit
 from scenenet.training.tuning import choose
 
+PLACE = np.array([544_000.0, 4_634_000.0, 100.0])
 POLE = (500_020.5, 4_630_031.5)
 DUTCH_TOWER_HEIGHT_M = 42.0
 LONE_POLES = DetectionSettings(min_conductor=0)
@@ -202,6 +203,7 @@ def test_the_summary_describes_the_prediction(predicted, survey):
     assert summary["voxel_size_m"] == 1.0
     assert summary["kernel_size"] == [9, 9, 9]
     assert summary["settings"]["detection"] == LONE_POLES.model_dump()
+    assert summary["warnings"] == []
 
 
 @pytest.mark.parametrize("chunk_points", [997, 10**9])
@@ -288,7 +290,7 @@ def test_a_point_outside_the_lattice_is_named_and_nothing_is_written(scene, mode
     cloud = scene()
     xyz = np.concatenate([cloud.xyz, [[5e8, 0, 0]]])
     np.save(tmp_path / "stray.npy", np.column_stack([xyz, np.full(len(xyz), 2.0)]))
-    with pytest.raises(InputError, match="too far from the origin"):
+    with pytest.raises(InputError, match=r"stray\.npy: the point .* too far from the origin"):
         predict(tmp_path / "stray.npy", model, tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
 
@@ -370,3 +372,56 @@ def test_a_survey_that_is_not_in_metres_is_refused(tmp_path, model, epsg, reason
     with pytest.raises(InputError, match=rf"far\.laz.*{reason}.*Reproject"):
         predict(tmp_path / "far.laz", model, tmp_path / "out")
     assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_survey_whose_heights_are_in_feet_is_refused(tmp_path, model):
+    xyz = np.random.default_rng(0).uniform(0, 80, (50, 3)) + PLACE
+    cloud = PointCloud(xyz, np.ones(50, np.uint8), crs=pyproj.CRS("EPSG:32629+6360"))
+    write_las(tmp_path / "feet.laz", cloud)
+    with pytest.raises(InputError, match=r"feet\.laz.*unit of the heights is the US survey foot"):
+        predict(tmp_path / "feet.laz", model, tmp_path / "out")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_what_looks_wrong_is_in_the_summary_and_on_stderr(scene, model, tmp_path, capsys):
+    cloud = scene()
+    xyz = cloud.xyz.astype(np.float32).astype(np.float64)
+    path = tmp_path / "single.las"
+    write_las(path, PointCloud(xyz, cloud.classification, crs=pyproj.CRS(32629)))
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"PROJCRS", b"NONSENS"))
+    warnings = predict(path, model, tmp_path / "out").summary["warnings"]
+    assert [text[:45] for text in warnings] == [
+        "the coordinate system (WKT record) cannot be ",
+        "the coordinates are rounded as float32 number",
+    ]
+    shown = capsys.readouterr().err
+    assert all(f"warning: {path}: {text}" in shown for text in warnings)
+
+
+@pytest.mark.parametrize("shift", [0.3, 5.0, 5000.0])
+@pytest.mark.parametrize("same_number", [True, False])
+def test_a_survey_replaced_between_the_passes_leaves_the_earlier_result(
+    scene, model, tmp_path, monkeypatch, shift, same_number
+):
+    from scenenet.prediction import writers
+
+    cloud = scene([(20.5, 15.5)])
+    survey, other = tmp_path / "survey.las", tmp_path / "other.las"
+    write_las(survey, cloud)
+    east = np.array([shift, 0, 0])
+    kept = len(cloud) if same_number else len(cloud) - 100
+    write_las(other, PointCloud(cloud.xyz[:kept] + east, cloud.classification[:kept]))
+    first = predict(survey, model, tmp_path / "out")
+    earlier = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    assert first.summary["towers"] == 1
+    write = writers.write_points
+
+    def replace_and_write(prediction, out):
+        other.replace(survey)
+        write(prediction, out)
+
+    monkeypatch.setattr(writers, "write_points", replace_and_write)
+    with pytest.raises(InputError, match=r"survey\.las: the file was changed, replaced or removed"):
+        predict(survey, model, tmp_path / "out")
+    assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == earlier

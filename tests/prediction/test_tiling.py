@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -106,6 +108,21 @@ def test_a_point_outside_the_lattice_is_named(tmp_path, stray):
     message = r"the point \[.*\] is too far from the origin.*Remove stray"
     with pytest.raises(InputError, match=message):
         TileSpool(tmp_path, 1.0).add(xyz)
+
+
+@given(
+    st.integers(-(10**7), 10**7),
+    st.sampled_from([0.001, 0.01, 0.0025, 0.1]),
+    st.sampled_from([0.1, 0.3, 0.5, 1.0]),
+    st.integers(-(10**9), 10**9),
+)
+def test_the_offset_of_a_file_does_not_move_a_point_to_another_voxel(number, scale, size, offset):
+    """A point on the lower border of a voxel belongs to it, however the file stores the place."""
+    steps = number * round(size / scale)
+    x = (steps - offset) * scale + offset * scale  # integer times scale plus offset, as in LAS
+    spool = TileSpool(Path(), size)
+    place, middle = (spool.locate(np.full((1, 3), at)) for at in (x, (number + 0.5) * size))
+    np.testing.assert_array_equal(np.concatenate(place), np.concatenate(middle))
 
 
 @given(st.lists(st.integers(-3, 3), max_size=30))

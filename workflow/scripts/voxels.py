@@ -4,10 +4,17 @@ import _job
 
 
 def voxels(job: _job.Job) -> None:
+    from scenenet.core.errors import in_file
     from scenenet.dataset.voxel_cache import build
     from scenenet.dataset.voxels import VoxelSettings
 
-    build(job.input.manifest, VoxelSettings(**job.settings), job.output.store, job.output.manifest)
+    with in_file(job.input.manifest):
+        build(
+            job.input.manifest,
+            VoxelSettings(**job.settings),
+            job.output.store,
+            job.output.manifest,
+        )
 
 
 _job.run(voxels)

@@ -1,18 +1,52 @@
-"""The coordinate reference system of a LAS file, and the unit of its coordinates."""
+"""The coordinate reference system of a LAS file, and the units of its coordinates.
+
+A file can state its system as WKT (record 2112 of ``LASF_Projection``, or of ``liblas`` in older
+files) or as GeoTIFF keys (record 34735). WKT has priority, as in LAS 1.4. Heights can have a unit
+of their own: the third axis of a compound system, or the GeoTIFF keys 4096 and 4099.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+import struct
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    import laspy
     import pyproj
 
-USER = "LASF_Projection"
-RECORDS = {2112: "WKT record", 34735: "GeoTIFF keys"}
-"""Id of a record -> its name. WKT has priority over GeoTIFF keys, as in LAS 1.4."""
+    from scenenet.pointcloud.las.header import Vlr
+
+USERS = ("LASF_Projection", "liblas")
+WKT_RECORD, KEYS_RECORD, DOUBLES_RECORD = 2112, 34735, 34736
+GEOGRAPHIC, PROJECTED, VERTICAL = 2048, 3072, 4096
+"""GeoTIFF keys with the EPSG code of a system."""
+PLANAR_UNIT, PLANAR_UNIT_SIZE, VERTICAL_UNIT = 3076, 3077, 4099
+"""GeoTIFF keys with the EPSG code of a unit, or its size in metres."""
+USER_DEFINED = 32767
+EPSG_SYSTEMS = range(1024, USER_DEFINED)
+FEET_IN_WKT = re.compile(r'UNIT\s*\[\s*"([^"]*(?:foot|feet|ft)[^"]*)"\s*,\s*([0-9.]+)', re.I)
+VERTICAL_IN_WKT = re.compile(r"VERT(?:_CS|CS|CRS|ICALCRS)\s*\[", re.I)
+
+
+class Unit(NamedTuple):
+    """A unit of length.
+
+    Attributes:
+        name: as the EPSG data set or the file calls it.
+        metres: its size, m.
+        source: where the file states it, as the start of a message.
+    """
+
+    name: str
+    metres: float
+    source: str
+
+    @property
+    def is_metre(self) -> bool:
+        return abs(self.metres - 1) < 1e-4
 
 
 @dataclass(frozen=True)
@@ -21,56 +55,137 @@ class CrsRecord:
 
     Attributes:
         crs: the system; None if the file names none, or one that cannot be parsed.
-        problem: why a record gave no system; None if there is no problem.
+        problems: why a record gave no system or no unit, as sentences.
+        planar: unit of x and y; None for degrees or if unknown.
+        vertical: unit of z; None if the file does not state it.
     """
 
-    crs: pyproj.CRS | None
-    problem: str | None
-
-    @property
-    def unit_m(self) -> float | None:
-        """Metres in one planar unit of the coordinates; None for degrees or if unknown."""
-        return unit_in_metres(self.crs)
+    crs: pyproj.CRS | None = None
+    problems: tuple[str, ...] = ()
+    planar: Unit | None = None
+    vertical: Unit | None = None
 
 
-def unit_in_metres(crs: pyproj.CRS | None) -> float | None:
-    """Metres in one planar unit of a system; None for degrees or if unknown."""
-    if crs is None or crs.is_geographic or not crs.axis_info:
-        return None
-    return crs.axis_info[0].unit_conversion_factor
+def read_crs(records: Iterable[Vlr]) -> CrsRecord:
+    """The system in the records of a file; a broken record is a problem, not an error."""
+    ordered = [r for user in USERS for r in records if r.user_id == user]
+    problems: list[str] = []
+    found = [_of_wkt(r.data, problems) for r in ordered if r.record_id == WKT_RECORD]
+    doubles = next((r.data for r in ordered if r.record_id == DOUBLES_RECORD), b"")
+    found += [
+        _of_keys(_geo_keys(r.data), doubles, problems)
+        for r in ordered
+        if r.record_id == KEYS_RECORD
+    ]
+    named = next((record for record in found if record.crs is not None), None)
+    vertical = next((record.vertical for record in found if record.vertical), None)
+    if named is not None:  # what a worse record lacks does not matter then
+        return CrsRecord(named.crs, (), named.planar, vertical)
+    planar = next((record.planar for record in found if record.planar), None)
+    return CrsRecord(None, tuple(dict.fromkeys(problems)), planar, vertical)
 
 
-def in_degrees(
-    crs: pyproj.CRS | None,
-    mins: Sequence[float],
-    maxs: Sequence[float],
-    scales: Sequence[float] | None,
-) -> bool:
-    """Whether coordinates are degrees: according to the CRS or, without one, to steps and range."""
-    if crs is not None:
-        return bool(crs.is_geographic)
-    if scales is None or max(scales[:2]) > 1e-5:
-        return False
-    return max(map(abs, (mins[0], maxs[0]))) <= 180 and max(map(abs, (mins[1], maxs[1]))) <= 90
-
-
-def read_crs(header: laspy.LasHeader) -> CrsRecord:
-    """The system in the header's records; a broken record is reported in ``problem``, not
-    raised."""
+def _of_wkt(data: bytes, problems: list[str]) -> CrsRecord:
     import pyproj
 
-    problem = None
-    for record_id, kind in RECORDS.items():
-        for records in (header.vlrs, header.evlrs or ()):
-            for record in records:
-                if (record.user_id, record.record_id) != (USER, record_id):
-                    continue
-                try:
-                    crs = record.parse_crs()
-                except (pyproj.exceptions.CRSError, AttributeError):
-                    crs = None  # laspy leaves a record that it cannot parse as bytes
-                if crs is not None:
-                    return CrsRecord(crs, None)
-                if getattr(record, "string", None) != "":
-                    problem = problem or f"the coordinate system ({kind}) cannot be parsed"
-    return CrsRecord(None, problem)
+    text = data.split(b"\0", 1)[0].decode("utf-8", errors="replace").strip()
+    if not text:
+        return CrsRecord()
+    try:
+        crs = pyproj.CRS.from_wkt(text)
+    except pyproj.exceptions.CRSError:
+        problems.append("the coordinate system (WKT record) cannot be parsed")
+        return CrsRecord(None, (), *_feet_in(text))
+    return _of_crs(crs, f"CRS {crs.name}")
+
+
+def _feet_in(text: str) -> tuple[Unit | None, Unit | None]:
+    """Planar and vertical unit if a broken WKT names feet; a wrong unit must not pass as metres."""
+    source = "the WKT record, which cannot be parsed otherwise,"
+    start = VERTICAL_IN_WKT.search(text)
+    border = start.start() if start else len(text)
+    units: list[Unit | None] = []
+    for part in (text[:border], text[border:]):
+        feet = FEET_IN_WKT.search(part)
+        units.append(Unit(feet[1], float(feet[2]), source) if feet else None)
+    return units[0], units[1]
+
+
+def _of_crs(crs: pyproj.CRS, source: str) -> CrsRecord:
+    axes = crs.axis_info
+    if crs.is_geographic or not axes:
+        planar = None
+    else:
+        planar = Unit(axes[0].unit_name, axes[0].unit_conversion_factor, source)
+    vertical = None
+    if len(axes) > 2 and not crs.is_geocentric:
+        vertical = Unit(axes[2].unit_name, axes[2].unit_conversion_factor, source)
+    return CrsRecord(crs, (), planar, vertical)
+
+
+def _geo_keys(data: bytes) -> Mapping[int, tuple[int, int]]:
+    """Key -> (record of the value or 0, value or its position there)."""
+    entries: Iterator[tuple[int, int, int, int]] = struct.iter_unpack(
+        "<4H", data[8 : len(data) // 8 * 8]
+    )
+    return {key: (place, value) for key, place, _, value in entries}
+
+
+def _of_keys(keys: Mapping[int, tuple[int, int]], doubles: bytes, problems: list[str]) -> CrsRecord:
+    crs = _system(keys, PROJECTED) or _system(keys, GEOGRAPHIC)
+    named = CrsRecord() if crs is None else _of_crs(crs, f"CRS {crs.name}")
+    if crs is None:
+        problems.append("the coordinate system (GeoTIFF keys) cannot be parsed")
+    planar, vertical = named.planar, named.vertical
+    if crs is None or not crs.is_geographic:
+        planar = _stricter(planar, _unit(keys, PLANAR_UNIT, doubles, problems))
+    heights = _system(keys, VERTICAL)
+    if heights is not None and heights.is_vertical:
+        axis = heights.axis_info[0]
+        vertical = Unit(axis.unit_name, axis.unit_conversion_factor, f"CRS {heights.name}")
+    vertical = _stricter(vertical, _unit(keys, VERTICAL_UNIT, doubles, problems))
+    return CrsRecord(crs, (), planar, vertical)
+
+
+def _stricter(one: Unit | None, other: Unit | None) -> Unit | None:
+    """Of two statements about the same axis the one that is not metres, so that it is refused."""
+    known = [unit for unit in (one, other) if unit is not None]
+    return next((unit for unit in known if not unit.is_metre), known[0] if known else None)
+
+
+def _system(keys: Mapping[int, tuple[int, int]], key: int) -> pyproj.CRS | None:
+    import pyproj
+
+    place, code = keys.get(key, (0, 0))
+    if place != 0 or code not in EPSG_SYSTEMS:
+        return None
+    try:
+        return pyproj.CRS.from_epsg(code)
+    except pyproj.exceptions.CRSError:
+        return None
+
+
+def _unit(
+    keys: Mapping[int, tuple[int, int]], key: int, doubles: bytes, problems: list[str]
+) -> Unit | None:
+    place, code = keys.get(key, (0, 0))
+    if place != 0 or code == 0:
+        return None
+    source = f"GeoTIFF key {key}"
+    if known := _units().get(code):
+        return Unit(known[0], known[1], source)
+    at = keys.get(PLANAR_UNIT_SIZE, (0, 0))[1] * 8
+    if key == PLANAR_UNIT and PLANAR_UNIT_SIZE in keys and at + 8 <= len(doubles):
+        size = struct.unpack_from("<d", doubles, at)[0]
+        return Unit(f"unit of {size:g} m", size, source)
+    problems.append(f"the unit in {source} has the unknown code {code}")
+    return None
+
+
+@cache
+def _units() -> Mapping[int, tuple[str, float]]:
+    """EPSG code of a unit of length -> name, size in m."""
+    from pyproj.database import get_units_map
+
+    units = get_units_map("EPSG", "linear", allow_deprecated=True).values()
+    return {int(unit.code): (unit.name, unit.conv_factor) for unit in units}

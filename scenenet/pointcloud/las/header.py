@@ -1,9 +1,8 @@
 """The header of a LAS or LAZ file, read with laspy and checked against the size of the file.
 
 laspy trusts a header: a claim of a billion records is a loop of a billion steps, and a truncated
-    file
-is read as fewer points without a warning. So numbers that could make laspy loop are checked before
-it reads the header, and the claims about the points before it reads them.
+file is read as fewer points without a warning. So numbers that could make laspy loop are checked
+before it reads the header, and the claims about the points before it reads them.
 
 Layout of the public header block: ASPRS LAS 1.4 R15, section 2.4 (all numbers little endian).
 """
@@ -20,6 +19,7 @@ import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.las.chunk_table import check_chunks
+from scenenet.pointcloud.las.octree import COPC_INFO, check_octree
 
 if TYPE_CHECKING:
     import laspy
@@ -63,6 +63,7 @@ class CheckedHeader:
         path: the file.
         las: the header as laspy reads it; the file is large enough for its points.
         vlrs: the variable length records, unchanged.
+        evlrs: the extended ones after the points, unchanged.
         waveforms_inside: whether waveforms follow the points instead of being in a separate file.
         warnings: defects that do not prevent reading the points.
     """
@@ -70,15 +71,21 @@ class CheckedHeader:
     path: Path
     las: laspy.LasHeader
     vlrs: tuple[Vlr, ...]
+    evlrs: tuple[Vlr, ...]
     waveforms_inside: bool
     warnings: tuple[str, ...]
+
+    @property
+    def records(self) -> tuple[Vlr, ...]:
+        """All records, in the order of the file."""
+        return self.vlrs + self.evlrs
 
     @property
     def format(self) -> str:
         """``las``, ``laz`` or ``copc`` (a LAZ file whose points are ordered as an octree)."""
         if not self.las.are_points_compressed:
             return "las"
-        is_copc = bool(self.vlrs) and (self.vlrs[0].user_id, self.vlrs[0].record_id) == ("copc", 1)
+        is_copc = bool(self.vlrs) and (self.vlrs[0].user_id, self.vlrs[0].record_id) == COPC_INFO
         return "copc" if is_copc else "laz"
 
 
@@ -97,8 +104,8 @@ def read_header(path: str | Path) -> CheckedHeader:
         minor = _check_version(path, head, size)
         header_size, offset, n_vlrs = _check_places(path, head, size, minor)
         vlrs = _read_vlrs(stream, header_size, offset, n_vlrs, warnings)
-        read_evlrs = _can_read_evlrs(head, size, minor, warnings)
-        las = _read_with_laspy(path, stream, read_evlrs)
+        evlrs = _read_evlrs(stream, head, size, minor, warnings)
+        las = _read_with_laspy(path, stream, read_evlrs=evlrs is not None)
         _check_geometry(path, las, warnings)
         waveforms = las.start_of_waveform_data_packet_record if minor >= 3 else 0
         waveforms_inside = las.point_format.has_waveform_packet and 0 < waveforms < size
@@ -106,11 +113,19 @@ def read_header(path: str | Path) -> CheckedHeader:
             warnings.append(
                 "its waveforms are stored inside the file, so no prediction can be added"
             )
-        else:
-            _check_room(path, las, las.start_of_first_evlr if las.evlrs else size, warnings)
+        end = min(
+            size,
+            las.start_of_first_evlr if las.evlrs else size,
+            waveforms if waveforms_inside else size,
+        )
+        if end > las.offset_to_point_data:  # waveforms may also come before the points
+            _check_room(path, las, end, warnings)
         if las.are_points_compressed:
             check_chunks(path, las, stream, size)
-    return CheckedHeader(path, las, vlrs, waveforms_inside, tuple(warnings))
+            if vlrs and (vlrs[0].user_id, vlrs[0].record_id) == COPC_INFO:
+                check_octree(path, las.point_count, vlrs[0].data, stream, size)
+    warnings += _about_counts(head, las)
+    return CheckedHeader(path, las, vlrs, evlrs or (), waveforms_inside, tuple(warnings))
 
 
 def _check_version(path: Path, head: bytes, size: int) -> int:
@@ -185,20 +200,36 @@ def _read_vlrs(
     return tuple(vlrs)
 
 
-def _can_read_evlrs(head: bytes, size: int, minor: int, warnings: list[str]) -> bool:
+def _read_evlrs(
+    stream: BinaryIO, head: bytes, size: int, minor: int, warnings: list[str]
+) -> tuple[Vlr, ...] | None:
+    """The extended records; None if the file cannot have any, or not those that it claims."""
     if minor < 4:
-        return False
-    first, count = struct.unpack_from("<QI", head, 235)
-    fit = count == 0 or (0 < first <= size - count * EVLR_HEAD and size - first <= MAX_RECORDS)
+        return None
+    at, count = struct.unpack_from("<QI", head, 235)
+    fit = count == 0 or (0 < at <= size - count * EVLR_HEAD and size - at <= MAX_RECORDS)
+    evlrs: list[Vlr] = []
+    while fit and len(evlrs) < count:
+        stream.seek(at)
+        record = stream.read(EVLR_HEAD)
+        fit = len(record) == EVLR_HEAD
+        if fit:
+            user, record_id, length, text = struct.unpack("<2x16sHQ32s", record)
+            at += EVLR_HEAD + length
+            fit = at <= size
+        if fit:
+            user_id = user.split(b"\0", 1)[0].decode("latin-1")
+            evlrs.append(Vlr(user_id, record_id, text.split(b"\0", 1)[0], stream.read(length)))
     if not fit:
         warnings.append(
-            f"the header claims {count} extended variable length records from byte {first} on, "
-            f"but the file has {size} bytes, or they are too large; they are ignored"
+            f"the header claims {count} extended variable length records, but they do not fit in "
+            f"the {size} bytes of the file, or are too large; they are ignored"
         )
-    return fit
+        return None
+    return tuple(evlrs)
 
 
-def _read_with_laspy(path: Path, stream: BinaryIO, read_evlrs: bool) -> laspy.LasHeader:
+def _read_with_laspy(path: Path, stream: BinaryIO, *, read_evlrs: bool) -> laspy.LasHeader:
     import laspy
 
     stream.seek(0)
@@ -245,7 +276,7 @@ def _check_room(path: Path, las: laspy.LasHeader, end: int, warnings: list[str])
             file=path,
             remedy=REWRITE,
         )
-    if las.are_points_compressed or n_points == 0:
+    if las.are_points_compressed:
         return
     fit = max(room // length, 0)
     if n_points > fit:
@@ -256,8 +287,35 @@ def _check_room(path: Path, las: laspy.LasHeader, end: int, warnings: list[str])
             remedy=f"Get the whole file again; if it has only {fit} points, rewrite its "
             "header (pdal translate, las2las)",
         )
+    by_return = int(las.number_of_points_by_return.sum())
+    if fit > n_points and by_return == fit:
+        raise InputError(
+            f"the header claims {n_points} points, but the file has room for {fit}, and its "
+            f"numbers of points by return sum to {by_return}: the number of points is wrong",
+            file=path,
+            remedy=REWRITE,
+        )
     if fit > n_points:
         warnings.append(
             f"after the {n_points} points of the header there are {room - n_points * length} more "
             f"bytes, room for {fit - n_points} points, which are not read"
         )
+
+
+def _about_counts(head: bytes, las: laspy.LasHeader) -> list[str]:
+    """Contradictions between the counts of the header. The points themselves decide, see
+    ``decoder``; some programs that remove points do not update all counts."""
+    found = []
+    legacy = struct.unpack_from("<I", head, 107)[0]
+    if legacy not in (0, las.point_count):
+        found.append(
+            f"the header has two numbers of points: {legacy} in the field of LAS 1.3 and earlier, "
+            f"{las.point_count} in that of LAS 1.4; the second is used"
+        )
+    by_return = int(las.number_of_points_by_return.sum())
+    if by_return > las.point_count:
+        found.append(
+            f"the numbers of points by return in the header sum to {by_return}, but it claims "
+            f"{las.point_count} points"
+        )
+    return found

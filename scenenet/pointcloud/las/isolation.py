@@ -140,7 +140,12 @@ class _Pipe:
 
     def announced(self, kind: bytes, done: int) -> int:
         """The number of the next frame, which must be of this kind."""
-        got, n = decoder.FRAME.unpack(self._read(decoder.FRAME.size, done))
+        got, n = b"W", 0
+        while got == b"W":
+            got, n = decoder.FRAME.unpack(self._read(decoder.FRAME.size, done))
+        if got == b"C":
+            text = self._read(min(n, 10_000), done).decode(errors="replace")
+            raise InputError(text, file=self._header.path, remedy=REMEDY)
         if got == b"E":
             text = self._read(min(n, 10_000), done).decode(errors="replace")
             raise InputError(

@@ -6,7 +6,7 @@ correspond to thesis Table 5.1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,13 +18,15 @@ from scenenet.core.settings import Settings
 from scenenet.pointcloud.class_schemes import ClassScheme, class_scheme
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.file_kinds import kind_of
-from scenenet.pointcloud.las.crs import CrsRecord, in_degrees, read_crs
+from scenenet.pointcloud.las.crs import Unit
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
 from scenenet.pointcloud.quality.cell_counts import CellCounts, DuplicateCount
-from scenenet.pointcloud.quality.report import SurveyReport, class_table, find_warnings
-from scenenet.pointcloud.reading import iter_chunks, survey_info
+from scenenet.pointcloud.quality.report import SurveyReport, about_points, class_table
+from scenenet.pointcloud.quality.screening import Finding, Screening, of_samples
+from scenenet.pointcloud.reading import SurveyInfo, iter_chunks, survey_info
 from scenenet.pointcloud.ts40k import sample_files
+from scenenet.pointcloud.units import look_like_degrees
 
 if TYPE_CHECKING:
     import laspy
@@ -115,16 +117,24 @@ def check_survey(
     """
     settings = settings or CheckSettings()
     path = Path(path)
-    if path.is_dir():
-        reports = [check_survey(sample, codes, settings) for sample in sample_files(path)]
-        return _together(path, reports, None if codes is None else class_scheme(codes))
     scheme = None if codes is None else class_scheme(codes)
+    if path.is_dir():
+        checked = [_check(sample, scheme, settings) for sample in sample_files(path)]
+        return _together(path, checked, scheme)
+    return _check(path, scheme, settings)[0]
+
+
+def _check(
+    path: Path, scheme: ClassScheme | None, settings: CheckSettings
+) -> tuple[SurveyReport, list[Finding]]:
+    """The report on one file, and those of its warnings that a folder reports together."""
     info = survey_info(path)
     header = read_header(path) if kind_of(path) == "las" else None
-    record = CrsRecord(None, None) if header is None else read_crs(header.las)
-    degrees = in_degrees(record.crs, info.mins, info.maxs, info.scales)
-    unit = record.unit_m or 1.0
+    degrees = _in_degrees(info)
+    planar = info.record.planar
+    unit = 1.0 if planar is None else planar.metres
     cell = settings.density_cell / (METRES_IN_A_DEGREE if degrees else unit)
+    screening = Screening(info, scheme)
     tally = Tally(
         planar=CellCounts(cell, settings.max_cells),
         vertical=CellCounts(settings.density_cell, settings.max_cells),
@@ -134,12 +144,22 @@ def check_survey(
         maxs=np.full(3, -np.inf),
     )
     if header is None:
-        for cloud in iter_chunks(path, codes, settings.chunk_points):
+        for cloud in iter_chunks(path, chunk_points=settings.chunk_points):
             _add_cloud(tally, cloud)
+            screening.add(cloud.xyz, cloud.classification)
     else:
         for records in iter_records(header, settings.chunk_points):
-            _add_records(tally, header.las, records)
-    return _report(info, record, degrees, unit, tally, scheme, settings)
+            screening.add(*_add_records(tally, header.las, records))
+    findings = screening.findings()
+    report = _report(info, degrees, unit, tally, scheme, findings, settings)
+    return report, findings
+
+
+def _in_degrees(info: SurveyInfo) -> bool:
+    """Whether planar coordinates are degrees: according to the CRS or, without one, to numbers."""
+    if info.crs is not None:
+        return bool(info.crs.is_geographic)
+    return info.record.planar is None and look_like_degrees(info.mins, info.maxs, info.scales)
 
 
 def _add_cloud(tally: Tally, cloud: PointCloud) -> None:
@@ -150,9 +170,10 @@ def _add_cloud(tally: Tally, cloud: PointCloud) -> None:
 
 def _add_records(
     tally: Tally, header: laspy.LasHeader, records: laspy.ScaleAwarePointRecord
-) -> None:
-    xyz = coordinates(records)
-    _add(tally, xyz, class_codes(records))
+) -> tuple[np.ndarray, np.ndarray]:
+    """Count points; returns their coordinates (n, 3) and class codes (n,)."""
+    xyz, codes = coordinates(records), class_codes(records)
+    _add(tally, xyz, codes)
     places = np.column_stack([records[axis] for axis in "XYZ"])
     tally.duplicates.add(places.astype(np.int64).view(np.uint64))
     margin = np.abs(header.scales)
@@ -165,6 +186,7 @@ def _add_records(
     tally.withheld += int(np.count_nonzero(records["withheld"]))
     tally.bad_returns += int(((number == 0) | (number > total)).sum())
     tally.has_returns |= bool((number | total).any())
+    return xyz, codes
 
 
 def _add(tally: Tally, xyz: np.ndarray, codes: np.ndarray) -> None:
@@ -186,7 +208,15 @@ def _count_stray(tally: Tally, settings: CheckSettings) -> int:
     return stray if stray <= settings.stray_share * total else 0
 
 
-def _report(info, record, degrees, unit, tally, scheme, settings) -> SurveyReport:
+def _report(
+    info: SurveyInfo,
+    degrees: bool,
+    unit: float,
+    tally: Tally,
+    scheme: ClassScheme | None,
+    findings: Sequence[Finding],
+    settings: CheckSettings,
+) -> SurveyReport:
     n_points = int(tally.counts.sum())
     area = None
     if n_points and not degrees:
@@ -203,9 +233,10 @@ def _report(info, record, degrees, unit, tally, scheme, settings) -> SurveyRepor
         "header_maxs": _finite(np.array(info.maxs)),
         "area_m2": area,
         "density_per_m2": None if not area else n_points / area,
-        "crs": None if record.crs is None else record.crs.name,
-        "epsg": None if record.crs is None else record.crs.to_epsg(),
-        "unit": "degree" if degrees else _unit_name(record),
+        "crs": None if info.crs is None else info.crs.name,
+        "epsg": None if info.crs is None else info.crs.to_epsg(),
+        "unit": "degree" if degrees else _unit_name(info.record.planar),
+        "vertical_unit": _unit_name(info.record.vertical),
         "codes": None if scheme is None else scheme.name,
         "extra_dimensions": list(info.extra_dimensions),
         "duplicated_points": tally.duplicates.estimate(n_points),
@@ -217,8 +248,8 @@ def _report(info, record, degrees, unit, tally, scheme, settings) -> SurveyRepor
         "impossible_returns": tally.bad_returns if tally.has_returns else 0,
     }
     classes = class_table(tally.counts, scheme)
-    warnings = find_warnings(facts, tally.counts, scheme, record, info.warnings)
-    return SurveyReport(facts, classes, tuple(warnings))
+    warnings = [finding.text for finding in findings]
+    return SurveyReport(facts, classes, tuple(warnings + about_points(facts)))
 
 
 SUMMED = (
@@ -228,9 +259,12 @@ SUMMED = (
 
 
 def _together(
-    folder: Path, reports: Sequence[SurveyReport], scheme: ClassScheme | None
+    folder: Path,
+    checked: Sequence[tuple[SurveyReport, list[Finding]]],
+    scheme: ClassScheme | None,
 ) -> SurveyReport:
     """The report on the samples of a folder as one survey; ``samples`` is their number."""
+    reports = [report for report, _ in checked]
     each = [report.facts for report in reports]
     counts = np.zeros(256, np.int64)
     for report in reports:
@@ -245,7 +279,8 @@ def _together(
     areas = [one["area_m2"] for one in each if one["area_m2"]]
     facts["area_m2"] = sum(areas) if areas else None
     facts["density_per_m2"] = facts["n_points"] / facts["area_m2"] if areas else None
-    warnings = find_warnings(facts, counts, scheme, CrsRecord(None, None), ())
+    by_sample = {report.facts["survey"]: findings for report, findings in checked}
+    warnings = of_samples(by_sample, counts, scheme) + about_points(facts)
     if scheme is not None and any(counts[code] for code in scheme.tower):
         without = [report.facts["survey"] for report in reports if not _has_tower(report, scheme)]
         if without:
@@ -265,12 +300,9 @@ def _finite(values: np.ndarray) -> list[float] | None:
     return values.tolist() if np.isfinite(values).all() else None
 
 
-def _unit_name(record: CrsRecord) -> str | None:
-    if record.unit_m is None:
+def _unit_name(unit: Unit | None) -> str | None:
+    if unit is None:
         return None
-    names: Iterator[str] = (
-        name
-        for name, metres in (("metre", 1.0), ("foot", 0.3048), ("US survey foot", 1200 / 3937))
-        if abs(record.unit_m - metres) < 1e-9
-    )
-    return next(names, f"{record.unit_m:g} m")
+    known = (("metre", 1.0), ("foot", 0.3048), ("US survey foot", 1200 / 3937))
+    same = (name for name, metres in known if abs(unit.metres - metres) < 1e-9)
+    return next(same, unit.name)

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scenenet.pointcloud.class_schemes import ClassScheme
-from scenenet.pointcloud.las.crs import CrsRecord
+from scenenet.pointcloud.quality.codes import in_words
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FLAG_BITS = 0x1F
 MANY_DUPLICATES = 0.001
 """Share of duplicated points above which there is a warning."""
-MANY_CODES = 8
-"""Undefined codes that a warning lists one by one."""
 
 
 @dataclass(frozen=True)
@@ -97,52 +93,16 @@ def class_table(counts: np.ndarray, scheme: ClassScheme | None) -> pd.DataFrame:
     )
 
 
-def find_warnings(
-    facts: dict[str, Any],
-    counts: np.ndarray,
-    scheme: ClassScheme | None,
-    record: CrsRecord,
-    from_header: Sequence[str],
-) -> list[str]:
-    """Defects to consider before the survey is used, as sentences."""
-    warnings = list(from_header)
-    if not facts["n_points"]:
-        return [*warnings, "the survey has no points"]
-    if record.crs is None and record.problem is None:
-        warnings.append(
-            "the file names no coordinate system; its coordinates are taken to be in metres"
-        )
-    if facts["unit"] == "degree":
-        warnings.append(
-            "the coordinates are in degrees, but tower detection needs metres; reproject the "
-            "survey "
-            "to a projected system first"
-        )
-    elif record.unit_m is not None and abs(record.unit_m - 1) > 1e-9:
-        warnings.append(
-            f"the unit of the coordinates is the {facts['unit']}, but tower detection needs "
-            "metres; "
-            "reproject the survey first"
-        )
-    warnings += _about_points(facts)
-    if scheme is not None:
-        warnings += _about_classes(facts, counts, scheme)
-    return warnings
-
-
-def _points(n: int) -> str:
-    return "1 point" if n == 1 else f"{n} points"
-
-
-def _about_points(facts: dict[str, Any]) -> list[str]:
+def about_points(facts: dict[str, Any]) -> list[str]:
+    """What is odd about the points of a survey, as sentences, from the facts of its report."""
     n = facts["n_points"]
     warnings = []
     if facts["stray_points"]:
-        warnings.append(f"stray coordinates: {_points(facts['stray_points'])} far from all others")
+        warnings.append(f"stray coordinates: {in_words(facts['stray_points'])} far from all others")
     if facts["duplicated_points"] > MANY_DUPLICATES * n:
         about = "about " if facts["duplicates_estimated"] else ""
         warnings.append(
-            f"duplicates: {about}{_points(facts['duplicated_points'])} "
+            f"duplicates: {about}{in_words(facts['duplicated_points'])} "
             f"({100 * facts['duplicated_points'] / n:.1f} %) have the coordinates of another point"
         )
     counted = (
@@ -151,31 +111,4 @@ def _about_points(facts: dict[str, Any]) -> list[str]:
         ("impossible_returns", "with an impossible return number (the number is not used)"),
         ("withheld_points", "marked as withheld by the producer (they are kept)"),
     )
-    return warnings + [f"{_points(facts[key])} {text}" for key, text in counted if facts[key]]
-
-
-def _about_classes(facts: dict[str, Any], counts: np.ndarray, scheme: ClassScheme) -> list[str]:
-    warnings = []
-    found = np.flatnonzero(counts).tolist()
-    unknown = [code for code in found if code not in scheme.classes]
-    if unknown:
-        listed = ", ".join(f"{code} ({_points(counts[code])})" for code in unknown[:MANY_CODES])
-        if len(unknown) > MANY_CODES:
-            listed += f" and {len(unknown) - MANY_CODES} more"
-        hint = ""
-        if all(code & 0x80 and code & FLAG_BITS in scheme.classes for code in unknown):
-            real = ", ".join(str(code & FLAG_BITS) for code in unknown)
-            hint = f"; they look like {real} with flags in the upper bits"
-        warnings.append(f"class scheme {scheme.name} does not define these codes: {listed}{hint}")
-    if not any(counts[code] for code in scheme.tower):
-        tower = ", ".join(map(str, sorted(scheme.tower)))
-        warnings.append(
-            f"no point is labelled tower (code {tower} in {scheme.name}): the survey can be "
-            "predicted, but not used for training"
-        )
-    if facts["format"] == "pt" and scheme.name != "ts40k" and max(found) <= 5:
-        warnings.append(
-            f"all class codes are 5 or below. The .pt samples of TS40K have six merged classes "
-            f"(tower 4): use class scheme ts40k, not {scheme.name}"
-        )
-    return warnings
+    return warnings + [f"{in_words(facts[key])} {text}" for key, text in counted if facts[key]]

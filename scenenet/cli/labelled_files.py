@@ -113,10 +113,10 @@ def _read_file(
     Returns:
         the manifests of its crops and of their grids, in ``folder``.
     """
+    found = survey_towers(path, codes, TowerSettings())
     warnings = survey_warnings(path, codes)
     warn(path, warnings)
     files.warnings.extend(f"{path}: {text}" for text in warnings)
-    found = survey_towers(path, codes, TowerSettings())
     files.skipped.extend({"sample": path.name, "reason": note} for note in found.notes())
     crops, voxels = folder / "crops.json", folder / "voxels.json"
     facts = cut_crops(

@@ -78,6 +78,9 @@ def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> Labe
     """Towers of a labelled survey, of one TS40K sample, or of a folder of TS40K samples.
 
     Only points labelled tower are kept in memory.
+
+    Raises:
+        InputError: a file cannot be read, or its coordinates are known not to be metres.
     """
     samples = sample_files(path)
     if not samples:
@@ -85,6 +88,7 @@ def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> Labe
         return find_towers(_tower_points(path, codes), settings)
     tables, left_out = [], []
     for sample in samples:
+        survey_in_metres(sample)
         found = find_towers(_tower_points(sample, codes), settings)
         tables.append(found.towers.assign(sample=sample.stem, spacing=np.nan))
         left_out.append(found.left_out.assign(sample=sample.stem))

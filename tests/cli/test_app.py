@@ -240,3 +240,36 @@ def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path
     assert "no incomplete file was left" in output and "Traceback" not in output
     assert list(tmp_path.iterdir()) in ([], [out])
     assert not out.exists() or list(out.iterdir()) == []
+
+
+def test_codes_of_another_scheme_are_said_where_they_matter(survey, model, tmp_path):
+    """EDP codes taken for ASPRS: towers have the same code, but conductors are insulators."""
+    done = scenenet("evaluate", survey, "--model", model, "--codes", "asprs", "--json")
+    assert done.returncode == 0, done.stderr
+    (text,) = json.loads(done.stdout)["warnings"]
+    assert f"{survey}: the class codes look like those of scheme edp, not asprs" in text
+    assert f"warning: {text}" in done.stderr
+    fitting = scenenet("evaluate", survey, "--model", model, "--codes", "edp", "--json")
+    assert json.loads(fitting.stdout)["warnings"] == []
+
+
+@pytest.mark.parametrize("command", ["train", "evaluate", "predict", "explain"])
+def test_degrees_without_a_coordinate_system_are_refused(command, survey, model, tmp_path):
+    from scenenet.pointcloud import read
+
+    cloud = read(survey)
+    degrees = (cloud.xyz - [545_000, 4_633_000, 0]) / [83_000, 111_000, 1] + [-8.45, 41.85, 0]
+    path = tmp_path / "degrees.npy"
+    np.save(path, np.column_stack([degrees, cloud.classification]))
+    out = tmp_path / ("out.html" if command == "explain" else "out.json")
+    options = {
+        "train": ["--codes", "edp", "--out", out],
+        "evaluate": ["--codes", "edp", "--model", model],
+        "predict": ["--model", model, "--out", tmp_path / "out"],
+        "explain": ["--model", model, "--out", out],
+    }
+    done = scenenet(command, path, *options[command])
+    assert done.returncode == 1, done.stdout
+    errors = [line for line in done.stderr.splitlines() if line.startswith("error:")]
+    assert len(errors) == 1 and "degrees.npy" in errors[0] and "look like degrees" in errors[0]
+    assert not out.exists()

@@ -113,13 +113,10 @@ def read_header(path: str | Path) -> CheckedHeader:
             warnings.append(
                 "its waveforms are stored inside the file, so no prediction can be added"
             )
-        end = min(
-            size,
-            las.start_of_first_evlr if las.evlrs else size,
-            waveforms if waveforms_inside else size,
-        )
-        if end > las.offset_to_point_data:  # waveforms may also come before the points
-            _check_room(path, las, end, warnings)
+        end = las.start_of_first_evlr if las.evlrs else size
+        if waveforms_inside and waveforms > las.offset_to_point_data:
+            end = min(end, waveforms)
+        _check_room(path, las, end, warnings)
         if las.are_points_compressed:
             check_chunks(path, las, stream, size)
             if vlrs and (vlrs[0].user_id, vlrs[0].record_id) == COPC_INFO:

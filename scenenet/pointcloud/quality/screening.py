@@ -66,8 +66,9 @@ class Screening:
         if len(xyz) == 0:
             return
         self.n_points += len(xyz)
-        self.mins = np.minimum(self.mins, xyz.min(axis=0))
-        self.maxs = np.maximum(self.maxs, xyz.max(axis=0))
+        # Column by column: several times as fast as along the first axis.
+        self.mins = np.minimum(self.mins, [column.min() for column in xyz.T])
+        self.maxs = np.maximum(self.maxs, [column.max() for column in xyz.T])
         if self.scheme is not None:
             self.counts += np.bincount(codes, minlength=256)
         sample = xyz[:: max(1, len(xyz) // SAMPLE_POINTS)]

@@ -9,8 +9,14 @@ from typing import TYPE_CHECKING, Any
 from scenenet.core import files
 from scenenet.core.errors import InputError
 from scenenet.results.folder import Results, SeedResult
+from scenenet.tracking.database import exclusive, require_schema
 from scenenet.tracking.logged_model import model_ids
-from scenenet.tracking.store import TrackingSettings, exclusive, open_client, store_errors
+from scenenet.tracking.store import (
+    TrackingSettings,
+    check_same_store,
+    open_client,
+    store_errors,
+)
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
@@ -42,11 +48,15 @@ def register_champions(
         the content of ``record``.
 
     Raises:
-        InputError: a champion has no run in the store.
+        InputError: a champion has no run in the store, or the store is not the one that the runs
+            were logged to.
     """
-    logged = files.read_json(runs)["runs"]
+    recorded = files.read_json(runs)
+    logged = recorded["runs"]
     registered: dict[str, Any] = {}
     with exclusive(settings.uri), store_errors(settings.uri):
+        check_same_store(settings.uri, recorded, runs)
+        require_schema(settings.uri)
         client = open_client(settings.uri)
         for name, champion in _champions(settings.experiment, results).items():
             key = f"reproduction/{dataset}/{champion.model}/seed-{champion.seed}"

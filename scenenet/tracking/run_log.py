@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Any
 from scenenet.core import files
 from scenenet.core.errors import InputError
 from scenenet.core.scratch import scratch_folder
+from scenenet.tracking.database import exclusive, require_schema
 from scenenet.tracking.logged_model import ModelRecord, log_model, model_ids
 from scenenet.tracking.store import (
     TrackingSettings,
     check_same_store,
-    check_schema,
-    exclusive,
     open_client,
     store_errors,
+    store_id,
 )
 
 if TYPE_CHECKING:
@@ -144,13 +144,16 @@ def log_runs(
         the content of ``record``.
 
     Raises:
-        InputError: the store is not the one of the record, or as for ``create_store``.
+        InputError: the store is not the one of the record, was removed or replaced meanwhile, or as
+            for ``create_store``.
     """
-    if store is not None:
-        check_same_store(settings, Path(store))
+    made = None if store is None else files.read_json(store)
     runs: dict[str, Any] = {}
     with exclusive(settings.uri), store_errors(settings.uri):
-        check_schema(settings.uri)
+        if made is not None:
+            check_same_store(settings.uri, made, str(store))
+        require_schema(settings.uri)
+        logged_to = store_id(settings.uri)
         client = open_client(settings.uri)
         experiment = client.get_experiment_by_name(settings.experiment)
         if experiment is None:
@@ -162,7 +165,14 @@ def log_runs(
             client.set_experiment_tag(experiment.experiment_id, NOTE_TAG, note)
         for group in groups:
             runs |= _log_group(client, experiment.experiment_id, group)
-    written = {"uri": settings.uri, "experiment": settings.experiment, "runs": runs}
+        written = {
+            "uri": settings.uri,
+            "store": logged_to,
+            "experiment": settings.experiment,
+            "runs": runs,
+        }
+        # MLflow goes on writing to a file that was removed; the runs would be lost without a word.
+        check_same_store(settings.uri, written, record)
     files.write_json(record, written)
     return written
 

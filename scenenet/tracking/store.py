@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sqlite3
-import subprocess
-import sys
 import uuid
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote, urlparse
@@ -18,13 +15,22 @@ from pydantic import Field
 from scenenet.core import files
 from scenenet.core.errors import InputError
 from scenenet.core.settings import Settings
+from scenenet.tracking.database import (
+    WAIT_S,
+    DatabaseLockedError,
+    create_database,
+    database_error,
+    database_of,
+    exclusive,
+    reading,
+    require_schema,
+)
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
     from mlflow.entities import Experiment
 
-SQLITE = "sqlite:///"
-STORE_TAG = "scenenet.dataset.zarr_store"
+STORE_TAG = "scenenet.store"
 EXPERIMENT_TAGS = {"mlflow.experimentKind": "custom_model_development"}
 """Makes MLflow show the experiment as model training and not as language model work."""
 
@@ -46,7 +52,10 @@ def experiment_of(settings: TrackingSettings, study: str) -> TrackingSettings:
 
 
 def create_store(
-    settings: TrackingSettings, record: str | Path, experiments: Sequence[str] = ()
+    settings: TrackingSettings,
+    record: str | Path,
+    experiments: Sequence[str] = (),
+    request: str = "",
 ) -> dict[str, Any]:
     """Create the store and its experiments, unless they exist, before anything is logged.
 
@@ -54,19 +63,20 @@ def create_store(
 
     Args:
         settings: where the store is.
-        record: JSON file to write: uri, id of the store (a new database has a new id) and the id of
-            each experiment.
+        record: JSON file to write: uri, id of the store (a new database has a new id), request, and
+            the id of each experiment.
         experiments: names of experiments in addition to that of ``settings``.
+        request: of ``request_for``; written to the record.
 
     Returns:
         the content of ``record``.
 
     Raises:
         InputError: the store has the schema of another MLflow version, is not an MLflow store,
-            cannot be reached, or was moved away from its artifacts.
+            is locked or damaged, cannot be reached, or was moved away from its artifacts.
     """
     with exclusive(settings.uri):
-        _create_database(settings.uri)
+        create_database(settings.uri)
         with store_errors(settings.uri):
             client = open_client(settings.uri)
             found = [_experiment(client, settings.uri, name)
@@ -77,43 +87,83 @@ def create_store(
                 if experiment.tags.get(STORE_TAG) != store:
                     client.set_experiment_tag(experiment.experiment_id, STORE_TAG, store)
     ids = {experiment.name: experiment.experiment_id for experiment in found}
-    written = {"uri": settings.uri, "store": store, "experiments": ids}
+    written = {"uri": settings.uri, "store": store, "request": request, "experiments": ids}
     files.write_json(record, written)
     return written
 
 
-def store_id(uri: str) -> str | None:
-    """Id of the SQLite store at ``uri``; None if it does not exist yet, and for other stores.
+def store_id(uri: str, wait_s: float = WAIT_S) -> str | None:
+    """Id of the SQLite store at ``uri``; None for a server, and for a file without an id.
 
-    Reads one value and imports nothing heavy, so that the workflow can call it while it plans.
+    Raises:
+        InputError: the file does not exist, is empty, is locked or is damaged.
     """
-    database = _database(uri)
-    if database is None or not database.is_file():
+    database = database_of(uri)
+    if database is None:
         return None
     query = "SELECT value FROM experiment_tags WHERE key = ? ORDER BY experiment_id LIMIT 1"
-    try:
-        with contextlib.closing(_open_to_read(database)) as connection:
-            row = connection.execute(query, (STORE_TAG,)).fetchone()
-    except sqlite3.Error:
-        return None
+    with reading(database, wait_s) as connection:
+        tables = connection.execute("SELECT 1 FROM sqlite_master WHERE name = 'experiment_tags'")
+        if tables.fetchone() is None:
+            return None
+        row = connection.execute(query, (STORE_TAG,)).fetchone()
     return None if row is None else row[0]
 
 
-def check_same_store(settings: TrackingSettings, record: Path) -> None:
-    """Check that a store is the one that ``create_store`` recorded.
+def request_for(uri: str, record: str | Path) -> str:
+    """What the creation of the store is requested with; a new value requests it again.
+
+    The value stays the same for as long as the store is the one of the record, and is another one
+    if the store was removed, replaced or emptied. So the workflow can compare it with that of the
+    last run. A store that is locked while the workflow plans is not looked at.
+
+    Args:
+        uri: of the store.
+        record: the file that ``create_store`` wrote with this value; empty text if it is missing.
+    """
+    try:
+        written = files.read_json(record)
+        request, recorded = str(written["request"]), written["store"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return ""
+    if database_of(uri) is None:
+        return request
+    try:
+        present = store_id(uri, wait_s=0.5)
+    except DatabaseLockedError:
+        return request
+    except InputError:
+        present = None
+    return request if present == recorded else files.digest([request, recorded, present])
+
+
+def check_same_store(uri: str, recorded: Mapping[str, Any], record: str | Path) -> None:
+    """Check that a store exists and is the one that a record belongs to.
+
+    Args:
+        uri: of the store.
+        recorded: content of the record, with ``uri`` and ``store``.
+        record: the file of the record, for the message.
 
     Raises:
-        InputError: it is another store.
+        InputError: it is another store, or the file does not exist, is empty, half made, locked or
+            damaged.
     """
-    written = files.read_json(record)
-    present = store_id(settings.uri)
-    other_uri = written["uri"] != settings.uri
-    if other_uri or (_database(settings.uri) is not None and written["store"] != present):
+    if recorded["uri"] != uri:
         raise InputError(
-            f"the MLflow store {settings.uri} is not the one of this record",
+            f"belongs to the MLflow store {recorded['uri']}, not to {uri}",
             file=record,
-            remedy="Delete the record and run the workflow again",
+            remedy="Run the workflow again: it logs all runs to the store of the settings",
         )
+    database = database_of(uri)
+    if database is None or store_id(uri) == recorded["store"]:
+        return
+    require_schema(uri)
+    raise InputError(
+        f"is not the MLflow store that {record} belongs to",
+        file=database,
+        remedy="Put that store back; or run the workflow again: it logs all runs to this one",
+    )
 
 
 def open_client(uri: str) -> MlflowClient:
@@ -125,7 +175,7 @@ def open_client(uri: str) -> MlflowClient:
 
 def _experiment(client: MlflowClient, uri: str, name: str) -> Experiment:
     """The experiment, created if missing and restored if it was deleted in the UI."""
-    database = _database(uri)
+    database = database_of(uri)
     expected = None if database is None else database.parent.resolve() / "mlartifacts" / name
     experiment = client.get_experiment_by_name(name)
     if experiment is None:
@@ -156,97 +206,17 @@ def _check_artifacts(database: Path, location: str, expected: Path) -> None:
     folder.mkdir(parents=True)
 
 
-def _create_database(uri: str) -> None:
-    """Create an SQLite database with the tables of MLflow, unless it exists."""
-    database = _database(uri)
-    if database is None or check_schema(uri):
-        return
-    database.parent.mkdir(parents=True, exist_ok=True)
-    # In a separate process, because it configures logging and migrations for the interpreter.
-    done = subprocess.run(
-        [sys.executable, "-m", "mlflow", "db", "upgrade", uri],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true"},
-    )
-    if done.returncode:
-        last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
-        raise InputError(f"the MLflow store could not be created ({''.join(last)})", file=database)
-
-
-def check_schema(uri: str) -> bool:
-    """Whether the database has tables. MLflow would migrate an older one without asking.
-
-    Raises:
-        InputError: its tables are of another MLflow version, or not of MLflow.
-    """
-    database = _database(uri)
-    if database is None:
-        return True
-    if not database.is_file() or database.stat().st_size == 0:
-        return False
-    try:
-        with contextlib.closing(_open_to_read(database)) as connection:
-            tables = {row[0] for row in connection.execute("SELECT name FROM sqlite_master")}
-            if not tables:
-                return False
-            if not {"experiments", "alembic_version"} <= tables:
-                raise InputError("is a database, but not of MLflow", file=database)
-            (revision,) = connection.execute("SELECT version_num FROM alembic_version").fetchone()
-    except sqlite3.DatabaseError as error:
-        raise InputError(f"is not an SQLite database ({error})", file=database) from None
-    newest, known = _schema_revisions()
-    if revision == newest:
-        return True
-    age = "an older" if revision in known else "a newer"
-    remedy = (
-        f"Make a copy of the file, then run: mlflow db upgrade {uri}"
-        if revision in known
-        else "Install the MLflow version that created it"
-    )
-    raise InputError(f"was created by {age} version of MLflow", file=database, remedy=remedy)
-
-
-def _schema_revisions() -> tuple[str | None, set[str]]:
-    """The schema of the installed MLflow, and all earlier ones."""
-    import mlflow
-    from alembic.script import ScriptDirectory
-
-    script = ScriptDirectory(str(Path(mlflow.__file__).parent / "store" / "db_migrations"))
-    return script.get_current_head(), {step.revision for step in script.walk_revisions()}
-
-
-def _open_to_read(database: Path) -> sqlite3.Connection:
-    return sqlite3.connect(f"{database.resolve().as_uri()}?mode=ro", uri=True)
-
-
-def _database(uri: str) -> Path | None:
-    """The file of a SQLite store; None for a server."""
-    return Path(uri.removeprefix(SQLITE)) if uri.startswith(SQLITE) else None
-
-
-@contextlib.contextmanager
-def exclusive(uri: str) -> Iterator[None]:
-    """Lock an SQLite store for one process; a server does that itself."""
-    database = _database(uri)
-    if database is None:
-        yield
-        return
-    import fcntl
-
-    database.parent.mkdir(parents=True, exist_ok=True)
-    with database.with_name(f"{database.name}.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-
-
 @contextlib.contextmanager
 def store_errors(uri: str) -> Iterator[None]:
-    """Turn exceptions of MLflow about the store into ``InputError``."""
+    """Turn exceptions of MLflow and of its database into ``InputError``."""
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     from mlflow.exceptions import MlflowException
+    from sqlalchemy.exc import SQLAlchemyError
 
     try:
         yield
-    except MlflowException as error:
+    except (MlflowException, SQLAlchemyError) as error:
+        database = database_of(uri)
+        if database is not None and "sqlite3." in str(error):
+            raise database_error(database, error) from error
         raise InputError(f"MLflow refused the store {uri} ({error})") from error

@@ -130,15 +130,6 @@ def pictures(names):
     }
 
 
-def database():
-    """The SQLite file of the MLflow store, if it is one, as an output: deleting it makes the store,
-    its record and all runs again. It is updated and not replaced, because it may hold the runs of other
-    data and of other people; nothing depends on its date, so their runs do not rerun anything."""
-    uri = settings.tracking.uri
-    file = uri.removeprefix("sqlite:///")
-    return {} if file == uri else {"database": update(local(file))}
-
-
 def protocol():
     """Grid and split, as MLflow shows them."""
     return (

@@ -1,9 +1,15 @@
-"""MLflow: the store, and a run for every training."""
+"""MLflow: the store, and a run for every training.
+
+The database is no output of a rule. It holds the runs of other data and of other people, and Snakemake
+deletes, or restores, the outputs of a job that fails. The record of the store says which database it
+belongs to; ``request_for`` compares the two, so a database that was deleted or replaced is made again.
+"""
+
+from scenenet.tracking.store import request_for
 
 
 rule mlflow_store:
     output:
-        **database(),
         store=f"{R}/mlflow/store.json",
     log:
         f"{R}/logs/mlflow_store.log",
@@ -16,10 +22,11 @@ rule mlflow_store:
         mem_mb=2000,
         runtime=10,
     params:
-        job=job(
+        job=lambda w, output: job(
             "mlflow_store",
             SETTINGS["tracking"],
             studies=[*VALUES["study"], *EXPERIMENTS],
+            request=request_for(settings.tracking.uri, output.store),
         ),
     message:
         "Creating the MLflow store"

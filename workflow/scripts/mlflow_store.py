@@ -8,7 +8,7 @@ def mlflow_store(job: _job.Job) -> None:
 
     settings = TrackingSettings(**job.settings)
     names = [experiment_of(settings, study).experiment for study in job.identity["studies"]]
-    create_store(settings, job.output.store, names)
+    create_store(settings, job.output.store, names, job.identity["request"])
 
 
 _job.run(mlflow_store)

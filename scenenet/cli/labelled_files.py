@@ -176,7 +176,9 @@ def train_files(
             model, card, kept or training, tuning, training if kept else ()
         )
         candidates.append((seed, tuned, card, result))
-    seed, tuned, card, result = max(candidates, key=lambda entry: entry[3]["validation"]["f05"])
+    seed, tuned, card, result = max(
+        candidates, key=lambda entry: entry[3]["validation"]["f05"] or 0.0
+    )
     write_model(out, tuned, card)
     return {
         "model": str(out),

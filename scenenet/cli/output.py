@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-from scenenet.metrics.score_columns import SCORE_COLUMNS
+from scenenet.metrics.score_columns import SCORE_COLUMNS, score_text
 
 
 def show(data: Any, as_json: bool, lines: Callable[[Any], list[str]]) -> None:
@@ -20,15 +20,18 @@ def training_lines(result: dict[str, Any]) -> list[str]:
         f"{result['model']}: the best of {len(result['seeds'])} seeds (seed {result['seed']}), "
         f"{crops['training']} crops to train on, {crops['validation']} to tune on",
         f"tau {result['tau']:.3f}, kernel {'x'.join(map(str, result['kernel_size']))}, "
-        f"on the {result['tuned_on']} crops: P {scores['precision']:.2f} "
-        f"R {scores['recall']:.2f} F0.5 {scores['f05']:.3f} tower IoU {scores['iou_tower']:.3f}",
+        f"on the {result['tuned_on']} crops: P {score_text(scores['precision'])} "
+        f"R {score_text(scores['recall'])} F0.5 {score_text(scores['f05'], 3)} "
+        f"tower IoU {score_text(scores['iou_tower'], 3)}",
     ]
     return lines + [f"skipped: {s['sample']}: {s['reason']}" for s in result["skipped"]]
 
 
 def score_lines(result: dict[str, Any]) -> list[str]:
-    def row(name: str, scores: dict[str, float]) -> str:
-        return f"{name:<24}" + "".join(f"{scores[column.name]:>10.3f}" for column in SCORE_COLUMNS)
+    def row(name: str, scores: dict[str, float | None]) -> str:
+        values = [scores[column.name] for column in SCORE_COLUMNS]
+        cells = ["-" if value is None else f"{value:.3f}" for value in values]
+        return f"{name:<24}" + "".join(f"{cell:>10}" for cell in cells)
 
     towers = result["towers"]
     error = towers["median_error_m"]
@@ -41,6 +44,6 @@ def score_lines(result: dict[str, Any]) -> list[str]:
         row("predicting nothing", result["voxel_trivial"]),
         f"{result['voxel']['n_samples']} crops, tau {result['voxel']['tau']:.3f}",
         f"towers: {towers['n_predicted']} found, {towers['n_true']} true, "
-        f"precision {towers['precision']:.2f}, recall {towers['recall']:.2f}"
+        f"precision {score_text(towers['precision'])}, recall {score_text(towers['recall'])}"
         + ("" if error is None else f", median position error {error:.2f} m"),
     ]

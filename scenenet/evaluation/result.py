@@ -1,4 +1,7 @@
-"""The scores of a model on crops, as types and as the JSON files under ``results/evaluate``."""
+"""The scores of a model on crops, as types and as the JSON files under ``results/evaluate``.
+
+A score that is not defined (``scenenet.metrics.score_columns``) is None, and null in the files.
+"""
 
 from __future__ import annotations
 
@@ -21,11 +24,11 @@ class VoxelScores:
         n_samples: number of crops.
     """
 
-    precision: float
-    recall: float
-    f05: float
-    iou_tower: float
-    miou: float
+    precision: float | None
+    recall: float | None
+    f05: float | None
+    iou_tower: float | None
+    miou: float | None
     tau: float
     n_samples: int
 
@@ -44,8 +47,8 @@ class TowerScores:
         n_true, n_predicted: number of labelled and of detected towers.
     """
 
-    precision: float
-    recall: float
+    precision: float | None
+    recall: float | None
     median_error_m: float | None
     n_true: int
     n_predicted: int
@@ -69,11 +72,11 @@ class SampleScores:
     """
 
     id: str
-    precision: float
-    recall: float
-    f05: float
-    iou_tower: float
-    miou: float
+    precision: float | None
+    recall: float | None
+    f05: float | None
+    iou_tower: float | None
+    miou: float | None
     tp: int
     fp: int
     fn: int
@@ -81,8 +84,8 @@ class SampleScores:
     towers_true: int
     towers_predicted: int
     position_error_m: float | None
-    f05_observer: float
-    f05_towers: float
+    f05_observer: float | None
+    f05_towers: float | None
 
 
 @dataclass(frozen=True)
@@ -117,8 +120,8 @@ class Evaluation:
     voxel_occupied: VoxelScores
     towers: TowerScores
     per_sample: tuple[SampleScores, ...]
-    pr_curve: dict[str, list[float]]
-    average_precision: float
+    pr_curve: dict[str, list[float | None]]
+    average_precision: float | None
     part: str | None = None
     parameters: int | None = None
 

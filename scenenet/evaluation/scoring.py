@@ -143,8 +143,8 @@ def _of_sample(
     sample: VoxelSample,
     counts: Confusion,
     match: TowerMatch,
-    f05_observer: float,
-    f05_towers: float,
+    f05_observer: float | None,
+    f05_towers: float | None,
 ) -> SampleScores:
     return SampleScores(
         id=sample.id,

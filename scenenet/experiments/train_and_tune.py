@@ -37,7 +37,7 @@ class TunedModel:
     Attributes:
         predict: probabilities and labels of a sample.
         tau: threshold.
-        f05: F0.5 at tau on the crops that tau was chosen on.
+        f05: F0.5 at tau on the crops that tau was chosen on; 0 if it is not defined.
         parameters: number of trained parameters.
         seconds: time of training and tuning.
     """
@@ -118,7 +118,9 @@ def train_model(
     def predict(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
         return probabilities(model, sample, settings.measurement)
 
-    return TunedModel(predict, tau, counts.f05, model.n_parameters(), time.perf_counter() - begin)
+    return TunedModel(
+        predict, tau, counts.decisive, model.n_parameters(), time.perf_counter() - begin
+    )
 
 
 def _nothing(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
@@ -138,5 +140,5 @@ def train_boosted_trees(
     else:
         model, curve = boosted_trees.fit_and_tune(training, settings, seed)
     seconds = time.perf_counter() - begin
-    f05 = curve.best()[1].f05
+    f05 = curve.best()[1].decisive
     return TunedModel(model.probabilities, model.threshold(), f05, model.n_parameters(), seconds)

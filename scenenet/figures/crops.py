@@ -19,6 +19,7 @@ from scenenet.figures.selection import (
     ranked,
     thinned,
 )
+from scenenet.metrics.score_columns import score_text
 from scenenet.results.folder import Results, SeedResult
 
 if TYPE_CHECKING:
@@ -42,10 +43,10 @@ def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[s
     shown = [replace(view, values=view.values[keep]) for view in views]
     return side_views(cloud.xyz[keep], shown, out), (
         f"Crop {sample.id}: the {rank} of {len(chosen_by.evaluation.per_sample)} test crops "
-        f"by F0.5 of {reference} (F0.5 {sample.f05:.2f}, precision {sample.precision:.2f}, "
-        f"recall {sample.recall:.2f}{_counted(chosen_by, sample)}). Points have the probability "
-        "of their voxel; each model is its best seed on validation. Compare thesis Figures 5.8 and "
-        "5.9."
+        f"by F0.5 of {reference} (F0.5 {score_text(sample.f05)}, precision "
+        f"{score_text(sample.precision)}, recall {score_text(sample.recall)}"
+        f"{_counted(chosen_by, sample)}). Points have the probability of their voxel; each model "
+        "is its best seed on validation. Compare thesis Figures 5.8 and 5.9."
     )
 
 
@@ -53,7 +54,7 @@ def _counted(result: SeedResult, sample: SampleScores) -> str:
     """Which voxels the scores of a sample count, unless those at or above tau."""
     if not result.evaluation.whole_towers:
         return ""
-    return f"; whole towers. F0.5 of the voxels at or above tau: {sample.f05_observer:.2f}"
+    return f"; whole towers. F0.5 of the voxels at or above tau: {score_text(sample.f05_observer)}"
 
 
 def draw_prediction(results: Results, survey: str, out: Path) -> tuple[str, str]:
@@ -94,7 +95,8 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         centres = voxels.grid.centres(voxels.index)
         views.append(GridView(title, centres, size, voxels.tower, probability[voxels.index]))
         scores.append(
-            f"precision {counts.precision:.2f} and recall {counts.recall:.2f} at {resolution}³"
+            f"precision {score_text(counts.precision)} and recall {score_text(counts.recall)} "
+            f"at {resolution}³"
         )
     trained_on = {
         "m": "in metres",

@@ -23,11 +23,13 @@ if TYPE_CHECKING:
 def draw_curves(results: Results, thesis: Thesis | None, out: Path) -> tuple[str, str]:
     from scenenet.figures.plots.curves import precision_recall
 
-    curves = {
-        model: [r.evaluation.pr_curve for r in results.of_model(model)]
+    # Without labelled voxels there is no recall, and no curve.
+    scored = {
+        model: [r.evaluation for r in results.of_model(model)
+                if r.evaluation.average_precision is not None]
         for model in results.models
-        if any(r.evaluation.pr_curve for r in results.of_model(model))
-    }
+    }  # fmt: skip
+    curves = {model: [one.pr_curve for one in of] for model, of in scored.items() if of}
     published = {}
     for model, kind in results.models.items():
         if thesis is None:

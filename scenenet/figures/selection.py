@@ -37,8 +37,9 @@ def champion_of(results: Results, model: str) -> SeedResult:
 
 
 def ranked(champion: SeedResult, rank: str) -> SampleScores:
-    """The best, median or worst test crop by F0.5; ties by name."""
-    ordered = sorted(champion.evaluation.per_sample, key=lambda crop: (-crop.f05, crop.id))
+    """The best, median or worst test crop by F0.5, of those that have one; ties by name."""
+    scored = [(crop.f05, crop) for crop in champion.evaluation.per_sample if crop.f05 is not None]
+    ordered = [crop for _, crop in sorted(scored, key=lambda pair: (-pair[0], pair[1].id))]
     if not ordered:
         raise InputError(f"{champion.model} seed {champion.seed} has no evaluated crop")
     return {"best": ordered[0], "median": ordered[len(ordered) // 2], "worst": ordered[-1]}[rank]

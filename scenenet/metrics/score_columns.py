@@ -6,6 +6,7 @@ their columns from here. A score that is added to ``SCORE_COLUMNS`` appears in a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -27,36 +28,61 @@ class Counts(Protocol):
     def tn(self) -> int: ...
 
 
-def ratio(part: float, whole: float) -> float:
-    """``part / whole``; 0 if ``whole`` is 0: a model that detects nothing has precision 0."""
-    return part / whole if whole else 0.0
+def ratio(part: float, whole: float) -> float | None:
+    """``part / whole``; None, which means not defined, if ``whole`` is 0."""
+    return part / whole if whole else None
 
 
-def precision(counts: Counts) -> float:
+def precision(counts: Counts) -> float | None:
+    """Share of the detected voxels that are labelled. None if nothing is labelled or detected.
+
+    0 if something is labelled and nothing is detected: the thesis counts a dead model with 0 in its
+    means over seeds (5.2.6), and without it a model that detects nothing would raise them.
+    """
+    if counts.fn and not counts.tp + counts.fp:
+        return 0.0
     return ratio(counts.tp, counts.tp + counts.fp)
 
 
-def recall(counts: Counts) -> float:
+def recall(counts: Counts) -> float | None:
+    """Share of the labelled voxels that are detected. None if nothing is labelled."""
     return ratio(counts.tp, counts.tp + counts.fn)
 
 
-def f05(counts: Counts) -> float:
-    """F_beta = (1 + beta^2) P R / (beta^2 P + R), beta = 0.5."""
+def f05(counts: Counts) -> float | None:
+    """F_beta = (1 + beta^2) P R / (beta^2 P + R), beta = 0.5. None if nothing is labelled or
+    detected; 0 if nothing is labelled and something is detected."""
     b2 = BETA**2
     return ratio((1 + b2) * counts.tp, (1 + b2) * counts.tp + b2 * counts.fn + counts.fp)
 
 
-def iou_tower(counts: Counts) -> float:
+def iou_tower(counts: Counts) -> float | None:
+    """None if nothing is labelled or detected."""
     return ratio(counts.tp, counts.tp + counts.fp + counts.fn)
 
 
-def iou_background(counts: Counts) -> float:
+def iou_background(counts: Counts) -> float | None:
+    """None if every voxel is labelled and detected."""
     return ratio(counts.tn, counts.tn + counts.fp + counts.fn)
 
 
-def miou(counts: Counts) -> float:
-    """Mean over {background, tower}: the thesis' "IoU". Predicting nothing scores about 0.5."""
-    return (iou_tower(counts) + iou_background(counts)) / 2
+def miou(counts: Counts) -> float | None:
+    """Mean over {background, tower}: the thesis' "IoU". None if one of the two is not defined.
+
+    Predicting nothing scores about 0.5.
+    """
+    tower, background = iou_tower(counts), iou_background(counts)
+    return None if tower is None or background is None else (tower + background) / 2
+
+
+def or_nan(value: float | None) -> float:
+    """A score for a table of numbers, in which NaN means not defined."""
+    return math.nan if value is None else value
+
+
+def score_text(value: float | None, decimals: int = 2) -> str:
+    """A score in a sentence."""
+    return "not defined" if value is None or value != value else f"{value:.{decimals}f}"
 
 
 @dataclass(frozen=True)
@@ -68,7 +94,7 @@ class ScoreColumn:
         label: column title in the report.
         short: column title where space is scarce.
         description: what the score is, as a phrase.
-        compute: the score of the counts of all voxels of all samples.
+        compute: the score of the counts of all voxels of all samples; None if it is not defined.
         unit: ``1`` for a share between 0 and 1.
         higher_is_better: direction.
         tower_only: whether the score depends on the tower class alone. Tables that compare two
@@ -80,7 +106,7 @@ class ScoreColumn:
     label: str
     short: str
     description: str
-    compute: Callable[[Counts], float]
+    compute: Callable[[Counts], float | None]
     unit: str = "1"
     higher_is_better: bool = True
     tower_only: bool = True

@@ -77,11 +77,15 @@ class ThresholdCurve:
         return self.confusion(int(steps[0]))
 
     def precision_recall(self) -> tuple[np.ndarray, np.ndarray]:
-        """Precision and recall (650,) at each tau; both 0 where nothing is detected."""
+        """Precision and recall (650,) at each tau, NaN where they are not defined
+        (``scenenet.metrics.score_columns``)."""
         tp = self.true[::-1].cumsum()[::-1][1:]
         fp = self.false[::-1].cumsum()[::-1][1:]
-        detected = np.maximum(tp + fp, 1)
-        return tp / detected, tp / max(1, int(self.true.sum()))
+        labelled = int(self.true.sum())
+        precision = tp / np.maximum(tp + fp, 1)
+        if not labelled:
+            return np.where(tp + fp > 0, precision, np.nan), np.full(len(tp), np.nan)
+        return precision, tp / labelled
 
     def best(self) -> tuple[float, Confusion]:
         """tau with the highest F0.5 (the highest such tau in a tie), and the counts at it."""
@@ -92,20 +96,22 @@ class ThresholdCurve:
         step = int(len(f05) - 1 - np.argmax(f05[::-1]))
         return float(self.tau[step]), self.confusion(step)
 
-    def average_precision(self) -> float:
-        """Area under the precision-recall curve (thesis Figure 5.7), as a step function."""
+    def average_precision(self) -> float | None:
+        """Area under the precision-recall curve (thesis Figure 5.7), as a step function; None if
+        nothing is labelled tower."""
+        if not self.true.any():
+            return None
         precision, recall = self.precision_recall()
         gained = -np.diff(np.append(recall, 0.0))
         return float((precision * gained).sum())
 
 
-def curve_columns(curve: ThresholdCurve) -> dict[str, list[float]]:
-    """Precision, recall and F0.5 at every tau, as plain lists."""
-    precision, recall = curve.precision_recall()
-    confusions = [curve.confusion(step).f05 for step in range(len(curve.tau))]
+def curve_columns(curve: ThresholdCurve) -> dict[str, list[float | None]]:
+    """Precision, recall and F0.5 at every tau, as plain lists; None where they are not defined."""
+    counts = [curve.confusion(step) for step in range(len(curve.tau))]
     return {
         "tau": curve.tau.tolist(),
-        "precision": precision.tolist(),
-        "recall": recall.tolist(),
-        "f05": confusions,
+        "precision": [at_tau.precision for at_tau in counts],
+        "recall": [at_tau.recall for at_tau in counts],
+        "f05": [at_tau.f05 for at_tau in counts],
     }

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenenet.metrics.score_columns import ratio
+from scenenet.metrics.voxel_scores import Confusion
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,16 @@ class TowerMatch:
         )
 
     def scores(self) -> dict[str, float | int | None]:
-        """The numbers of ``scenenet.metrics.score_columns.MATCH_COLUMNS`` by their names."""
+        """The numbers of ``scenenet.metrics.score_columns.MATCH_COLUMNS`` by their names.
+
+        Precision and recall are defined as for voxels: without labelled towers there is no recall,
+        and without labelled and predicted towers no precision.
+        """
         hits = len(self.errors)
+        counts = Confusion(hits, self.n_predicted - hits, self.n_true - hits)
         return {
-            "precision": ratio(hits, self.n_predicted),
-            "recall": ratio(hits, self.n_true),
+            "precision": counts.precision,
+            "recall": counts.recall,
             "median_error_m": float(np.median(self.errors)) if hits else None,
             "n_true": self.n_true,
             "n_predicted": self.n_predicted,

@@ -28,34 +28,39 @@ class Confusion:
         )
 
     @property
-    def precision(self) -> float:
+    def precision(self) -> float | None:
         return score_columns.precision(self)
 
     @property
-    def recall(self) -> float:
+    def recall(self) -> float | None:
         return score_columns.recall(self)
 
     @property
-    def f05(self) -> float:
+    def f05(self) -> float | None:
         """As ``scenenet.metrics.score_columns.f05``."""
         return score_columns.f05(self)
 
     @property
-    def iou_tower(self) -> float:
+    def iou_tower(self) -> float | None:
         return score_columns.iou_tower(self)
 
     @property
-    def iou_background(self) -> float:
+    def iou_background(self) -> float | None:
         return score_columns.iou_background(self)
 
     @property
-    def miou(self) -> float:
+    def miou(self) -> float | None:
         """As ``scenenet.metrics.score_columns.miou``."""
         return score_columns.miou(self)
 
-    def scores(self) -> dict[str, float]:
-        """Every score of ``scenenet.metrics.score_columns`` by its name."""
-        return {column.name: float(column.compute(self)) for column in SCORE_COLUMNS}
+    @property
+    def decisive(self) -> float:
+        """F0.5 to choose by (thesis 5.2.7): 0 if it is not defined, because nothing is gained."""
+        return self.f05 or 0.0
+
+    def scores(self) -> dict[str, float | None]:
+        """Every score of ``scenenet.metrics.score_columns`` by its name; None if not defined."""
+        return {column.name: column.compute(self) for column in SCORE_COLUMNS}
 
     def without_predictions(self) -> Confusion:
         """The trivial baseline on the same voxels: a model that never predicts tower."""

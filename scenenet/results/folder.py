@@ -147,7 +147,7 @@ class Results:
     def champion(self, model: str) -> SeedResult | None:
         """The seed with the highest F0.5 on the validation crops, the first one in a tie."""
         tuned = [r for r in self.of_model(model) if r.validation]
-        return max(tuned, key=lambda r: r.validation["f05"], default=None)
+        return max(tuned, key=lambda r: r.validation["f05"] or 0.0, default=None)
 
     def seed(self, model: str, seed: int) -> SeedResult:
         """Read all results of one training.

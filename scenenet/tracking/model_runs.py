@@ -215,7 +215,8 @@ def _parent_record(
     metrics |= {"seeds": len(trained), "alive_share": len(live) / len(trained)}
     trivial = [result.evaluation.voxel_trivial for result in trained]
     for name in SCORES:
-        metrics[f"trivial_{name}"] = fmean(getattr(scores, name) for scores in trivial)
+        known = [value for s in trivial if (value := getattr(s, name)) is not None]
+        metrics[f"trivial_{name}"] = fmean(known) if known else None
     if champion is not None:
         metrics["champion_seed"] = champion.seed
         best = champion.evaluation.voxel

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from scenenet.core import files
 from scenenet.core.errors import InputError
+from scenenet.metrics.score_columns import score_text
 from scenenet.results.folder import Results, SeedResult
 from scenenet.tracking.database import exclusive, require_schema
 from scenenet.tracking.logged_model import model_ids
@@ -86,7 +87,7 @@ def _champions(experiment: str, results: Results) -> dict[str, SeedResult]:
         if (best := results.champion(model)) is not None
     }
     if champions:
-        best = max(champions.values(), key=lambda champion: champion.validation["f05"])
+        best = max(champions.values(), key=lambda champion: champion.validation["f05"] or 0.0)
         champions[experiment] = best
     return champions
 
@@ -119,7 +120,7 @@ def _tags(champion: SeedResult) -> Mapping[str, str]:
     return {
         "model": champion.model,
         "seed": str(champion.seed),
-        "validation_f05": f"{champion.validation['f05']:.4f}",
+        "validation_f05": score_text(champion.validation["f05"], 4),
         "tau": f"{champion.validation['tau']:.6g}",
     }
 

@@ -98,7 +98,7 @@ def _best_f05(
         for sample in training:
             occupancy, towers = batch([sample], measurement)
             total += ThresholdCurve(*count_reached(occupancy, kernel, bias, towers, THRESHOLDS))
-    return total.best()[1].f05
+    return total.best()[1].decisive
 
 
 def _towards_towers(model: CNN, training: Sequence[VoxelSample], measurement: Measurement) -> CNN:

@@ -15,6 +15,7 @@ import pandas as pd
 from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample
+from scenenet.metrics.score_columns import or_nan
 from scenenet.models.factory import new_model
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import PreparedCrop, curve_of, prepare_crops
@@ -102,7 +103,7 @@ def _row(
     if kept:
         curve = curve_of(model, kept)
         row["validation_loss"] = 1 - model.best_step(curve)[1]
-        row["validation_f05"] = curve.best()[1].f05
+        row["validation_f05"] = or_nan(curve.best()[1].f05)
     return row | model.shape_parameters()
 
 

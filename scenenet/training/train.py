@@ -19,6 +19,7 @@ from scenenet.dataset.batches import batch
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings
+from scenenet.metrics.score_columns import or_nan
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import ModelCard, write_model
@@ -205,9 +206,10 @@ def _validate(
             kind = settings.training.loss.fidelity
             errors.append(fidelity(model, occupancy, towers, weights, kind).item())
             sizes.append(occupancy.n_voxels)
+    curve = threshold_curve(model, validation, settings.measurement)
     return {
         "validation_loss": float(np.average(errors, weights=sizes)),
-        "validation_f05": threshold_curve(model, validation, settings.measurement).best()[1].f05,
+        "validation_f05": or_nan(curve.best()[1].f05),
     }
 
 

@@ -63,7 +63,7 @@ def choose(
     for candidate in candidates:
         tau, curve = tuned_tau(candidate, validation, learnt, card.measurement)
         counts = curve.at(tau)
-        tried.append((counts.f05, tau, candidate, curve, counts))
+        tried.append((counts.decisive, tau, candidate, curve, counts))
     # The size it was trained with comes first and wins a tie.
     _, tau, tuned, curve, counts = max(tried, key=lambda entry: entry[0])
     result = {
@@ -105,7 +105,7 @@ def champion(
         models, tunings: outputs of ``tune``, in the same order.
     """
     results = [read_json(path) for path in tunings]
-    best = max(range(len(results)), key=lambda i: results[i]["validation"]["f05"])
+    best = max(range(len(results)), key=lambda i: results[i]["validation"]["f05"] or 0.0)
     with atomic(out_model) as partial:
         shutil.copyfile(models[best], partial)
     return {"chosen": Path(models[best]).name, "validation": results[best]["validation"]}

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
+from scenenet.metrics.score_columns import score_text
+from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve, curve_columns
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.metrics.voxel_scores import Confusion, confusion
 
@@ -56,6 +57,42 @@ def test_a_perfect_prediction_scores_one():
     assert set(Confusion(tp=5, tn=95).scores().values()) == {1.0}
 
 
+SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
+
+
+@pytest.mark.parametrize(
+    ("counts", "undefined"),
+    [
+        (Confusion(tn=100), {"precision", "recall", "f05", "iou_tower", "miou"}),  # no tower
+        (Confusion(fp=3, tn=97), {"recall"}),  # found where there is none
+        (Confusion(fn=3, tn=97), set()),  # there and not found: 0, as the thesis counts
+        (Confusion(tp=3), {"miou"}),  # nothing but towers
+        (Confusion(), set(SCORES)),
+    ],
+)
+def test_a_score_without_anything_to_measure_is_not_zero(counts, undefined):
+    scores = counts.scores()
+    assert {name for name, value in scores.items() if value is None} == undefined
+    assert all(0 <= value <= 1 for value in scores.values() if value is not None)
+
+
+def test_nothing_there_and_nothing_found_has_no_curve():
+    curve = ThresholdCurve.of(np.array([0.9, 0.0]), np.array([False, False]))
+    columns = curve_columns(curve)
+    assert curve.average_precision() is None
+    assert set(columns["recall"]) == {None}
+    assert columns["precision"][0] == 0 and columns["precision"][-1] is None
+    assert columns["f05"][0] == 0 and columns["f05"][-1] is None
+    tau, counts = curve.best()
+    assert (tau, counts.decisive) == (THRESHOLDS[-1], 0)
+
+
+def test_a_score_is_written_in_a_sentence():
+    assert [score_text(value) for value in (None, float("nan"), 0.0, 0.125)] == [
+        "not defined", "not defined", "0.00", "0.12"
+    ]  # fmt: skip
+
+
 def test_counts_of_samples_add_up():
     assert MOCK + Confusion(1, 2, 3, 4) == Confusion(3, 3, 7, 17)
 
@@ -81,7 +118,8 @@ def test_the_curve_is_the_direct_confusion_at_each_tau(prediction):
     for step in {0, 1, 299, 300, last - 1, last, *beside.tolist(), *(beside - 1).tolist()}:
         direct = confusion(probability, tower, float(curve.tau[step]))
         assert curve.confusion(step) == direct
-        assert (precision[step], recall[step]) == (direct.precision, direct.recall)
+        for value, expected in ((precision[step], direct.precision), (recall[step], direct.recall)):
+            assert np.isnan(value) if expected is None else value == expected
 
 
 @given(predictions, predictions)
@@ -96,8 +134,8 @@ def test_curves_of_two_samples_add_up_to_the_curve_of_both(one, other):
 def test_the_chosen_tau_has_the_best_f05_of_all(prediction):
     curve = ThresholdCurve.of(*prediction)
     tau, counts = curve.best()
-    every = [curve.confusion(step).f05 for step in range(1000)]
-    assert counts.f05 == pytest.approx(max(every))
+    every = [curve.confusion(step).decisive for step in range(1000)]
+    assert counts.decisive == pytest.approx(max(every))
     assert counts == confusion(*prediction, tau)
 
 
@@ -168,12 +206,15 @@ def test_nearest_pairs_come_first():
     assert match.errors.tolist() == [1.0]
 
 
-@pytest.mark.parametrize(("n_predicted", "n_true"), [(0, 0), (0, 2), (2, 0)])
-def test_without_matches_there_is_no_position_error(n_predicted, n_true):
+@pytest.mark.parametrize(
+    ("n_predicted", "n_true", "precision", "recall"),
+    [(0, 0, None, None), (0, 2, 0.0, 0.0), (2, 0, 0.0, None)],
+)
+def test_without_matches_there_is_no_position_error(n_predicted, n_true, precision, recall):
     scores = match_towers(np.zeros((n_predicted, 2)), np.zeros((n_true, 2))).scores()
     assert scores == {
-        "precision": 0.0,
-        "recall": 0.0,
+        "precision": precision,
+        "recall": recall,
         "median_error_m": None,
         "n_true": n_true,
         "n_predicted": n_predicted,

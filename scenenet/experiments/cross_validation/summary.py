@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from scenenet.metrics.score_columns import AT_TAU, DECISIVE, SCORES, score_column
+from scenenet.metrics.score_columns import AT_TAU, DECISIVE, SCORES, score_column, score_text
 from scenenet.metrics.voxel_scores import Confusion
 
 COUNTS = ("tp", "fp", "fn", "tn")
@@ -70,7 +70,7 @@ def ranking(table: pd.DataFrame, models: Mapping[str, str]) -> str:
     """
     ranked = table.sort_values(DECISIVE, ascending=False)
     scores = [
-        f"{case_name(row['model'], row['voxels'])} {row[DECISIVE]:.3f}"
+        f"{case_name(row['model'], row['voxels'])} {score_text(row[DECISIVE], 3)}"
         for row in ranked.to_dict("records")
     ]
     return f"{score_column(DECISIVE).label} of the tower class, best first: {', '.join(scores)}."

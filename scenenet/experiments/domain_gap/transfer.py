@@ -19,6 +19,7 @@ from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
 from scenenet.experiments.domain_gap.compare_crops import real_crops, synthetic_crops
 from scenenet.experiments.train_and_tune import TunedModel, train_boosted_trees, train_model
+from scenenet.metrics.score_columns import score_text
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings, TrainingSettings
@@ -120,7 +121,8 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|")
     for row in table.to_dict("records"):
         numbers = [
-            f"{row[key]:.3f}" for key in ("precision", "recall", "f05", "iou_tower", "best_f05")
+            score_text(row[key], 3)
+            for key in ("precision", "recall", "f05", "iou_tower", "best_f05")
         ]
         print(f"| {row['model']} | {row['trained_on']} | {' | '.join(numbers)} |")
 

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from scenenet.experiments.label_noise.settings import AGAINST, LABELS
-from scenenet.metrics.score_columns import TOWER_ONLY_SCORES
+from scenenet.metrics.score_columns import TOWER_ONLY_SCORES, score_text
 
 MEASURED = (
     *(f"{against}_{score}" for against in AGAINST for score in TOWER_ONLY_SCORES),
@@ -94,7 +94,7 @@ def claim(table: pd.DataFrame, models: Mapping[str, str]) -> str:
         )
     return (
         f"With {much['share'].mean():.0%} of the tower points mislabelled, the labels have an F0.5 "
-        f"of {labels:.2f} against the truth. {' '.join(verdicts)}"
+        f"of {score_text(labels)} against the truth. {' '.join(verdicts)}"
     )
 
 
@@ -127,7 +127,7 @@ def _mean(rows: pd.DataFrame, column: str) -> float:
 
 
 def _listed(values: pd.Series) -> str:
-    return ", ".join(f"{value:.2f}" for value in values)
+    return ", ".join(score_text(value) for value in values)
 
 
 def _shares(rows: pd.DataFrame) -> str:

@@ -14,7 +14,7 @@ import pandas as pd
 
 from scenenet.figures.plots.style import COLOURS, legend, new_figure, readable, save
 
-Curve = Mapping[str, Sequence[float]]
+Curve = Mapping[str, Sequence[float | None]]
 """Lists ``precision`` and ``recall`` of one length, tau ascending, as evaluation writes them."""
 
 
@@ -115,7 +115,8 @@ def precision_recall(
         if published and model in published:
             axis.plot(*published[model], "D", ms=8, mfc="none", mec=colour, mew=1.8,
                       label=f"{model} in the thesis, at its tau")  # fmt: skip
-    reached = [float(np.max(curve["recall"])) for of in curves.values() for curve in of]
+    every = [curve["recall"] for of in curves.values() for curve in of]
+    reached = [recall for of in every for recall in of if recall is not None]
     reached += [recall for recall, _ in (published or {}).values()]
     end = min(1.0, 1.15 * max(reached, default=1.0)) or 1.0
     axis.set(xlabel="recall", ylabel="precision", xlim=(0, end), ylim=(0, 1.02))

@@ -13,7 +13,7 @@ import pandas as pd
 from scenenet.experiments.cross_validation.summary import CASE, case_name, summarise_folds
 from scenenet.experiments.label_noise.settings import LABELS
 from scenenet.figures.plots.style import COLOURS, new_figure, save
-from scenenet.metrics.score_columns import CHART_SCORES
+from scenenet.metrics.score_columns import CHART_SCORES, score_text
 
 PANELS = {
     "labels_f05": "compared with labels of the same quality",
@@ -51,7 +51,8 @@ def label_noise(summary: pd.DataFrame, out: str | Path) -> str:
     save(figure, out)
     worst = summary[summary["level"] == summary["level"].max()]
     scores = [
-        f"{row.model} {row.labels_f05:.2f} and {row.truth_f05:.2f}" for row in worst.itertuples()
+        f"{row.model} {score_text(row.labels_f05)} and {score_text(row.truth_f05)}"
+        for row in worst.itertuples()
     ]
     return (
         "Two line charts of F0.5 over the share of wrong labels, compared with the labels and with "
@@ -87,9 +88,9 @@ def cross_validation(runs: pd.DataFrame, out: str | Path) -> str:
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     save(figure, out)
     scores = "; ".join(
-        f"{case_name(row.model, row.voxels)}: precision {row.precision:.2f}, recall "
-        f"{row.recall:.2f}, F0.5 {row.f05:.2f}, folds from {row.worst_fold_f05:.2f} to "
-        f"{row.best_fold_f05:.2f}"
+        f"{case_name(row.model, row.voxels)}: precision {score_text(row.precision)}, recall "
+        f"{score_text(row.recall)}, F0.5 {score_text(row.f05)}, folds from "
+        f"{score_text(row.worst_fold_f05)} to {score_text(row.best_fold_f05)}"
         for row in summary.itertuples()
     )
     return f"Cross-validated scores of each model as points. {scores}."

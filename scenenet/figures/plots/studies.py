@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from scenenet.figures.plots.style import COLOURS, legend, new_figure, save
-from scenenet.metrics.score_columns import CHART_SCORES
+from scenenet.metrics.score_columns import CHART_SCORES, score_text
 
 
 def rows(summary: pd.DataFrame, out: str | Path) -> str:
@@ -35,7 +35,8 @@ def rows(summary: pd.DataFrame, out: str | Path) -> str:
     legend(axis)
     save(figure, out)
     scores = "; ".join(
-        f"{row.variant}: precision {row.precision:.2f}, recall {row.recall:.2f}, F0.5 {row.f05:.2f}"
+        f"{row.variant}: precision {score_text(row.precision)}, recall {score_text(row.recall)}, "
+        f"F0.5 {score_text(row.f05)}"
         for row in summary.itertuples()
     )
     return f"Scores of each variant as points. {scores}."

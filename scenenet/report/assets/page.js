@@ -99,12 +99,12 @@ class Scene {
     const above = (counts) => counts.slice(step + 1).reduce((sum, count) => sum + count, 0);
     const found = above(this.data.true), wrong = above(this.data.false);
     const all = this.data.true.reduce((sum, count) => sum + count, 0);
-    const precision = found + wrong ? found / (found + wrong) : 0;
-    const recall = all ? found / all : 0;
-    const low = 0.25 * precision + recall;
-    const f05 = low ? (1.25 * precision * recall) / low : 0;
-    this.scores.textContent = `tau ${this.data.taus[step]}: precision ${precision.toFixed(3)}, ` +
-      `recall ${recall.toFixed(3)}, F0.5 ${f05.toFixed(3)}`;
+    // As in scenenet/metrics/score_columns.py: nothing labelled and nothing detected has no score.
+    const text = (part, whole) => whole ? (part / whole).toFixed(3) : "not defined";
+    const precision = all && !(found + wrong) ? "0.000" : text(found, found + wrong);
+    const f05 = text(1.25 * found, 1.25 * found + 0.25 * (all - found) + wrong);
+    this.scores.textContent = `tau ${this.data.taus[step]}: precision ${precision}, ` +
+      `recall ${text(found, all)}, F0.5 ${f05}`;
   }
 
   // A function from the number of a voxel to its colour, for the selected colouring.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from scenenet.figures import CROP_RANKS
 from scenenet.figures.interactive_crop import PALETTE
+from scenenet.metrics.score_columns import score_text
 from scenenet.report.blocks import Block, Column, Scene, Section, Text, table
 from scenenet.report.context import VOXEL_SCORES, ReportContext, with_published
 
@@ -64,8 +65,8 @@ def _scenes(context: ReportContext) -> list[Block]:
                 "Contributions are red where a GENEO raises the output and blue where it lowers "
                 "it. "
                 f"Scores count all voxels of the grid; the slider has {n - 1} thresholds. Whole "
-                f"towers at the tau of the model: precision {whole['precision']:.3f}, recall "
-                f"{whole['recall']:.3f}, F0.5 {whole['f05']:.3f}.",
+                f"towers at the tau of the model: precision {score_text(whole['precision'], 3)}, "
+                f"recall {score_text(whole['recall'], 3)}, F0.5 {score_text(whole['f05'], 3)}.",
                 f"The occupied voxels of crop {data['crop']} in space.",
                 [*kinds, *geneos],
                 {**data, "palette": PALETTE},

@@ -6,7 +6,7 @@ from scenenet.experiments.cross_validation.summary import case_name
 from scenenet.experiments.label_noise.settings import AGAINST, LABELS
 from scenenet.experiments.label_noise.summary import findings
 from scenenet.experiments.registry import EXPERIMENTS
-from scenenet.metrics.score_columns import SCORE_COLUMNS
+from scenenet.metrics.score_columns import SCORE_COLUMNS, score_text
 from scenenet.report.blocks import Column, Facts, Notes, Section, Text, table
 from scenenet.report.context import ReportContext
 
@@ -46,7 +46,7 @@ def cross_validation(context: ReportContext) -> Section | None:
     )
     ranked = frame.sort_values("f05", ascending=False)
     facts = [
-        (f"F0.5, {case_name(row.model, row.voxels)}", f"{row.f05:.3f}")
+        (f"F0.5, {case_name(row.model, row.voxels)}", score_text(row.f05, 3))
         for row in ranked.itertuples()
     ]
     return Section(
@@ -69,7 +69,7 @@ def label_noise(context: ReportContext) -> Section | None:
         return None
     worst = frame[frame["level"] == frame["level"].max()]
     facts = [
-        (f"F0.5 of {row.model} against the truth", f"{row.truth_f05:.2f}")
+        (f"F0.5 of {row.model} against the truth", score_text(row.truth_f05))
         for row in worst.itertuples()
     ]
     scores = [

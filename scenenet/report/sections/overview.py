@@ -7,7 +7,13 @@ from typing import Any
 
 import pandas as pd
 
-from scenenet.metrics.score_columns import AT_TAU, SCORE_COLUMNS, VOXELS, WHOLE_TOWERS
+from scenenet.metrics.score_columns import (
+    AT_TAU,
+    SCORE_COLUMNS,
+    VOXELS,
+    WHOLE_TOWERS,
+    score_text,
+)
 from scenenet.report.blocks import Block, Facts, Section, Text, write
 from scenenet.report.context import ReportContext
 from scenenet.results.folder import BOOSTED_TREES
@@ -69,8 +75,8 @@ def _task(context: ReportContext, first: Mapping[Any, Any]) -> str:
 def _headline(context: ReportContext, first: Mapping[Any, Any]) -> str:
     return (
         f"{first['model']}, {_kind(context, first)}, classifies the new surveys. Of the voxels it "
-        f"predicts as tower, {first['precision']:.0%} are labelled tower (precision); it finds "
-        f"{first['recall']:.0%} of the labelled tower voxels (recall). These numbers are for "
+        f"predicts as tower, {_share(first['precision'])} are labelled tower (precision); it finds "
+        f"{_share(first['recall'])} of the labelled tower voxels (recall). These numbers are for "
         f"{_seeds(first)}; they count {_counted(first)}."
     )
 
@@ -78,9 +84,11 @@ def _headline(context: ReportContext, first: Mapping[Any, Any]) -> str:
 def _comparison(context: ReportContext, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
     """The scores of another model, compared with the first one counted in the same way."""
     scores = (
-        f"{other['model']}, {_kind(context, other)}: precision {other['precision']:.2f}, recall "
-        f"{other['recall']:.2f} ({_seeds(other)}; {_counted(other)})."
+        f"{other['model']}, {_kind(context, other)}: precision {score_text(other['precision'])}, "
+        f"recall {score_text(other['recall'])} ({_seeds(other)}; {_counted(other)})."
     )
+    if pd.isna(other["f05"]) or pd.isna(first["f05"]):
+        return scores
     if not other["recall"]:
         return f"{scores} It detects no tower voxel."
     if other["voxels"] == first["voxels"]:
@@ -107,7 +115,9 @@ def _same_way(context: ReportContext, other: Mapping[Any, Any], first: Mapping[A
     pairs = []
     for voxels in reversed(VOXELS):
         ours, reference = (rows.loc[row["model"], f"{PARTS[voxels]}_f05"] for row in (other, first))
-        pairs.append(f"{ours:.2f} against {reference:.2f} for {first['model']} ({voxels})")
+        pairs.append(
+            f"{score_text(ours)} against {score_text(reference)} for {first['model']} ({voxels})"
+        )
     seeds_said = "one seed" if seeds == 1 else f"mean of {seeds} seeds"
     return f" Scored the same way, {seeds_said}: F0.5 {' and '.join(pairs)}."
 
@@ -120,9 +130,13 @@ def _terms(models: pd.DataFrame) -> str:
         "validation crops. Scores count in one of two ways: the voxels at or above tau, as in the "
         "thesis, or all voxels of the whole towers that are found with them. The IoU (intersection "
         "over union) of the thesis is the mean over background and tower; a model that never "
-        f"predicts tower already scores {trivial:.2f}, so the IoU of the tower class alone is "
-        f"given as well. A model is live if it detects at least one tower voxel."
+        f"predicts tower already scores {score_text(trivial)}, so the IoU of the tower class alone "
+        "is given as well. A model is live if it detects at least one tower voxel."
     )
+
+
+def _share(value: float) -> str:
+    return "a share that is not defined" if pd.isna(value) else f"{value:.0%}"
 
 
 def _counted(row: Mapping[Any, Any]) -> str:

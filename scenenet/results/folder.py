@@ -204,6 +204,11 @@ class Results:
         path = self.folder / "study" / study / "runs.csv"
         return read_table(path) if path.exists() else None
 
+    def study_times(self, study: str) -> pd.DataFrame | None:
+        """The times of a study, a row per variant and seed; None if it was not run."""
+        path = self.folder / "study" / study / "times.csv"
+        return read_table(path) if path.exists() else None
+
     def experiment_runs(self, experiment: str) -> pd.DataFrame:
         """The runs of an experiment, a row per training (and way to count).
 
@@ -211,6 +216,11 @@ class Results:
             InputError: the experiment was not run.
         """
         return read_table(self.folder / experiment / "runs.csv")
+
+    def experiment_times(self, experiment: str) -> pd.DataFrame | None:
+        """The times of an experiment, a row per training; None if it was not run."""
+        path = self.folder / experiment / "times.csv"
+        return read_table(path) if path.exists() else None
 
     def champion_file(self, model: str) -> Path | None:
         """The model that predicts (``models/MODEL.json``, or only ``.safetensors``)."""

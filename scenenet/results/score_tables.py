@@ -22,10 +22,9 @@ TRIVIAL = "nothing detected"
 
 
 def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
-    """One row per model and seed: test scores, tower scores, tau and training time."""
+    """One row per model and seed: test scores, tower scores, tau and epochs."""
     columns = ["model", "seed", "alive", "tau", "validation_f05", *SCORES, "average_precision",
-               *(f"tower_{name}" for name in MATCH_SCORES), "epochs",
-               "training_seconds"]  # fmt: skip
+               *(f"tower_{name}" for name in MATCH_SCORES), "epochs"]  # fmt: skip
     rows = []
     for result in results.trained:
         voxel, tower = result.evaluation.voxel, result.evaluation.towers
@@ -40,7 +39,6 @@ def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
                 result.evaluation.average_precision,
                 *(getattr(tower, name) for name in MATCH_SCORES),
                 result.epochs,
-                result.seconds,
             )
         )
     return pd.DataFrame(rows, columns=columns)

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
-from scenenet.core.files import atomic
+from scenenet.core.files import atomic, digest, sha256
 from scenenet.experiments.published import Thesis
 from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.experiments.studies.summary import summarise
@@ -22,6 +22,7 @@ from scenenet.results.dataset_tables import classes, towers, voxelisation
 from scenenet.results.folder import Results
 from scenenet.results.model_tables import certificate, parameters, times, turns
 from scenenet.results.score_tables import models, seeds, tower_scores, whole_towers
+from scenenet.results.time_tables import experiment_times, seed_times
 
 
 class Table(NamedTuple):
@@ -31,36 +32,43 @@ class Table(NamedTuple):
         title: a few words.
         section: section of the report that it belongs to.
         make: the table of a result folder.
+        times: whether it has times, which differ between two equal runs.
     """
 
     title: str
     section: str
     make: Callable[[Results, Thesis], pd.DataFrame]
+    times: bool = False
 
 
 TABLES: Mapping[str, Table] = {
     "classes": Table("Points of each class", "data", classes),
     "towers": Table("Labelled towers", "data", towers),
-    "voxelisation": Table("Voxelisation", "data", voxelisation),
+    "voxelisation": Table("Voxelisation", "data", voxelisation, times=True),
     "models": Table("Scores of each model", "models", models),
     "seeds": Table("Scores of each seed", "models", seeds),
     "whole_towers": Table("Voxels at or above tau, and whole towers", "models", whole_towers),
     "tower_scores": Table("Towers found", "models", tower_scores),
-    "times": Table("Times", "models", times),
+    "times": Table("Times", "models", times, times=True),
+    "seed_times": Table("Times of each seed", "models", seed_times, times=True),
+    "experiment_times": Table(
+        "Times of studies and experiments", "models", experiment_times, times=True
+    ),
     "parameters": Table("Learned parameters in metres", "learned", parameters),
     "certificate": Table("Verified properties", "learned", certificate),
     "certificate_turns": Table("Change of the output under rotation", "learned", turns),
 }
 """Every table by the stem of its file; the workflow writes and shows all of them."""
 
-COMPARISON = "thesis_and_ours"
-"""Stem of the table of ``scenenet.results.thesis_comparison``."""
+COMPARISON, TIMES_COMPARISON = "thesis_and_ours", "thesis_and_ours_times"
+"""Stems of the tables of ``scenenet.results.thesis_comparison``."""
 
 
 def table_titles() -> dict[str, tuple[str, str]]:
     """Stem of each table, those of the experiments included -> its title and its section."""
     titles = {name: (table.title, table.section) for name, table in TABLES.items()}
     titles[COMPARISON] = ("Thesis and this run", "models")
+    titles[TIMES_COMPARISON] = ("Thesis and this run, times", "models")
     return titles | {name: (one.title, one.section) for name, one in EXPERIMENTS.items()}
 
 
@@ -93,6 +101,22 @@ def write_tables(
             table.to_csv(partial, index=False, float_format="%.6g")
         paths.append(path)
     return paths
+
+
+def digest_scores(folder: str | Path, names: Iterable[str]) -> dict[str, Any]:
+    """A digest of the tables without times; two equal runs have the same.
+
+    Args:
+        folder: with the tables.
+        names: stems of all tables of the run, those with times included.
+
+    Returns:
+        ``digest``, and ``tables``: stem -> sha256 of its file.
+    """
+    timed = {name for name, table in TABLES.items() if table.times} | {TIMES_COMPARISON}
+    compared = sorted(set(names) - timed)
+    prints = {name: sha256(Path(folder) / f"{name}.csv") for name in compared}
+    return {"digest": digest(prints), "tables": prints}
 
 
 def print_scores(folder: str | Path, dataset: str, grid: str) -> None:

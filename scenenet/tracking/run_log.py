@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 from scenenet.core import files
 from scenenet.core.errors import InputError
 from scenenet.core.scratch import scratch_folder
+from scenenet.experiments.run_tables import TIMES
 from scenenet.tracking.database import exclusive, require_schema
 from scenenet.tracking.logged_model import ModelRecord, log_model, model_ids
 from scenenet.tracking.store import (
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from mlflow.entities import Run
 
 KEY_TAG, GROUP_TAG, DIGEST_TAG = "scenenet.key", "scenenet.group", "scenenet.digest"
+SCORES_TAG = "scenenet.scores"
+"""Digest of the final numbers of a run without times; two equal runs have the same."""
 NOTE_TAG = "mlflow.note.content"
 """Where MLflow keeps the description of a run or of an experiment."""
 
@@ -93,6 +96,12 @@ class RunRecord:
     model: ModelRecord | None = None
     seconds: float = 0.0
 
+    def scores(self) -> str:
+        """Digest of the final numbers without times; equal for two equal runs."""
+        return files.digest(
+            {name: repr(n) for name, n in self.metrics.items() if not name.startswith(TIMES)}
+        )
+
     def digest(self) -> str:
         """Digest of everything that is logged; files by their content."""
         return files.digest(
@@ -136,7 +145,8 @@ def log_runs(
     Args:
         settings: where the store is, and the experiment.
         groups: what to log.
-        record: JSON file to write: key -> run id, digest and whether it was logged or kept.
+        record: JSON file to write: key -> run id, digest, digest of the scores without times, and
+            whether it was logged or kept.
         store: the record that ``create_store`` wrote; checked against the store if given.
         note: description of the experiment.
 
@@ -203,7 +213,8 @@ def _sync(
     extra_tags: Mapping[str, str],
 ) -> dict[str, str]:
     """Make sure that exactly one run of ``record`` exists: the present one if it is equal."""
-    digest = record.digest()
+    digest, scores = record.digest(), record.scores()
+    extra_tags = {**extra_tags, SCORES_TAG: scores}
     kept = next((run for run in present if run.data.tags.get(DIGEST_TAG) == digest), None)
     if kept is None:
         run_id, status = _log(client, experiment, record, extra_tags, digest), "logged"
@@ -215,7 +226,7 @@ def _sync(
     for run in present:
         if run is not kept:
             _delete(client, run)
-    return {"run_id": run_id, "digest": digest, "status": status}
+    return {"run_id": run_id, "digest": digest, "scores": scores, "status": status}
 
 
 def _delete(client: MlflowClient, run: Run) -> None:

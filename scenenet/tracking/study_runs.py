@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from scenenet.experiments.run_tables import TIMES
 from scenenet.experiments.studies.settings import StudySettings, Variant
 from scenenet.metrics.score_columns import DECISIVE_FIRST
 from scenenet.tracking.model_runs import data_of, origin_tags
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
     from scenenet.figures import Picture
 
 FACTS = (
-    "tau", "alive", "training_crops", "parameters", "epochs", "loss", "training_seconds",
-    "inference_ms", "lowest_weight", "lowest_shape",
+    "tau", "alive", "training_crops", "parameters", "epochs", "loss", "lowest_weight",
+    "lowest_shape",
 )  # fmt: skip
 
 GIVEN = ("training_crops", "parameters", "epochs")
@@ -42,7 +43,8 @@ def study_groups(
     """The runs of a study.
 
     Args:
-        runs: of ``scenenet.experiments.studies.run``, a row per variant and seed.
+        runs: of ``scenenet.experiments.studies.run``, a row per variant and seed, with times
+            (``scenenet.experiments.run_tables.with_times``).
         dataset: name of the data; part of every key, so that runs on other data are kept.
         protocol: how the data were split and voxelised, for a tag.
         provenance: record of the study, for tags and the data set.
@@ -124,7 +126,7 @@ def _metrics(row: Mapping[str, Any], part: str) -> dict[str, float | None]:
     metrics: dict[str, float | None] = {
         f"{part}_{name}": float(row[name]) for name in (*DECISIVE_FIRST, "average_precision")
     }
-    return metrics | {name: float(row[name]) for name in FACTS}
+    return metrics | {name: float(row[name]) for name in (*FACTS, *TIMES)}
 
 
 def _means(seeds: Sequence[Mapping[str, float | None]]) -> dict[str, float | None]:

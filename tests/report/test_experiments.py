@@ -17,6 +17,7 @@ from scenenet.figures.experiments import EXPERIMENT_DRAWINGS
 from scenenet.metrics.score_columns import AT_TAU, WHOLE_TOWERS
 from scenenet.report.context import ReportContext
 from scenenet.report.page import SECTIONS
+from scenenet.experiments.run_tables import with_times
 from scenenet.report.sections import experiments as experiment_sections
 from scenenet.report.sections.experiments import EXPERIMENT_SECTIONS
 from scenenet.results.tables import write_tables
@@ -36,7 +37,6 @@ def noise_runs() -> pd.DataFrame:
             for model, f05 in ((LABELS, 1 - level), ("scenenet", 0.5), ("boosted trees", 0.4)):
                 row = dict.fromkeys(COLUMNS, 0.25) | {"level": level, "share": level}
                 row |= {"seed": seed, "model": model, "alive": True, "truth_f05": f05 + seed / 100}
-                row["training_seconds"] = None if model == LABELS else 2.0
                 rows.append(row)
     return pd.DataFrame(rows)
 
@@ -70,7 +70,9 @@ def test_no_experiment_no_section(results, thesis):
 
 
 def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
-    groups = label_noise_groups(noise_runs(), Origin("tiny"))
+    trained = noise_runs()[["level", "seed", "model"]]
+    times = trained[trained["model"] != LABELS].assign(training_seconds=2.0)
+    groups = label_noise_groups(with_times(noise_runs(), times), Origin("tiny"))
     assert len(groups) == 9
     group = next(g for g in groups if g.parent.name == "scenenet, 60% wrong")
     assert [child.key for child in group.children] == [
@@ -82,6 +84,9 @@ def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
     assert group.children[1].metrics["truth_f05"] == pytest.approx(0.51)
     assert group.children[1].params == {"level": 0.6, "model": "scenenet", "seed": 1}
     assert group.parent.seconds == 4.0
+    assert group.children[0].metrics["training_seconds"] == 2.0
+    (labels, *_) = groups
+    assert labels.children[0].metrics["training_seconds"] is None
     keys = [record.key for g in groups for record in (g.parent, *g.children)]
     assert len(set(keys)) == len(keys)
 

@@ -13,11 +13,14 @@ import pytest
 
 from scenenet.core.errors import InputError
 from scenenet.experiments.published import Thesis, read_thesis
-from scenenet.metrics.score_columns import AT_TAU, WHOLE_TOWERS
+from scenenet.experiments.studies.settings import StudySettings
+from scenenet.metrics.score_columns import AT_TAU, SCORES, WHOLE_TOWERS
 from scenenet.models.model_file import read_model
 from scenenet.results import tables
 from scenenet.results.folder import Results
 from scenenet.results.score_tables import TRIVIAL
+from scenenet.results.thesis_comparison import write_comparison
+from scenenet.results.time_tables import experiment_times
 
 
 def row(frame: pd.DataFrame, **where) -> pd.Series:
@@ -103,7 +106,9 @@ def test_each_seed_has_a_row(results: Results, thesis: Thesis):
     assert len(found) == 4
     dead = row(found, model="cnn", seed=1)
     assert not dead["alive"]
-    assert (dead["epochs"], dead["training_seconds"]) == (4, 8)
+    assert dead["epochs"] == 4
+    times = row(tables.TABLES["seed_times"].make(results, thesis), model="cnn", seed=1)
+    assert (times["epochs"], times["training_seconds"], times["peak_memory_mb"]) == (4, 8, 501)
 
 
 def test_position_errors_are_those_of_seeds_that_hit_something(results: Results, thesis: Thesis):
@@ -249,3 +254,76 @@ def test_both_ways_to_count_are_in_one_row(results: Results, thesis: Thesis):
     assert set(models.loc["scenenet", "voxels"]) == {WHOLE_TOWERS}
     assert set(np.atleast_1d(models.loc["cnn", "voxels"])) == {AT_TAU}
     assert seeds[seeds["model"] == "scenenet"]["f05"].mean() == pytest.approx(expected)
+
+
+def test_two_runs_that_differ_in_their_times_have_the_same_digest_of_scores(
+    results: Results, thesis: Thesis, tmp_path: Path
+):
+    def digest_of(folder: str) -> dict:
+        written = tables.write_tables(replace(results), thesis, tmp_path / folder)
+        comparisons = [tmp_path / folder / f"{n}.csv" for n in (tables.COMPARISON,
+                       tables.TIMES_COMPARISON)]  # fmt: skip
+        write_comparison(replace(results), thesis, *comparisons)
+        return tables.digest_scores(
+            tmp_path / folder, [path.stem for path in (*written, *comparisons)]
+        )
+
+    first = digest_of("first")
+    for history in results.folder.glob("train/*/*/history.csv"):
+        table = pd.read_csv(history)
+        table.assign(seconds=3 * table["seconds"]).to_csv(history, index=False)
+    for times in results.folder.glob("inference_time/*.json"):
+        told = json.loads(times.read_text())
+        told["inference_ms"] = {size: 3 * ms for size, ms in told["inference_ms"].items()}
+        times.write_text(json.dumps(told))
+    assert digest_of("slower") == first
+    slower, before = (tmp_path / name / "times.csv" for name in ("slower", "first"))
+    assert slower.read_bytes() != before.read_bytes()
+    assert {"seeds", "models", "thesis_and_ours"} <= set(first["tables"])
+    assert not {"times", "seed_times", "thesis_and_ours_times"} & set(first["tables"])
+    evaluation = results.folder / "evaluate" / "cnn" / "seed-0.json"
+    told = json.loads(evaluation.read_text())
+    told["voxel"]["precision"] += 0.01
+    evaluation.write_text(json.dumps(told))
+    assert digest_of("better")["digest"] != first["digest"]
+
+
+def test_a_score_that_is_not_defined_is_empty_in_every_table_and_no_zero(
+    results: Results, thesis: Thesis, tmp_path: Path
+):
+    """As for crops without a labelled tower in which none is found."""
+    nothing = dict.fromkeys(SCORES)
+    for path in results.folder.glob("evaluate/*/*.json"):
+        told = json.loads(path.read_text())
+        for part in [name for name in told if name.startswith("voxel")]:
+            told[part] |= nothing
+        told["towers"] |= {"precision": None, "recall": None, "n_true": 0, "n_predicted": 0}
+        told["average_precision"] = None
+        path.write_text(json.dumps(told))
+    fresh = replace(results)
+    tables.write_tables(fresh, thesis, tmp_path)
+    for name, columns in {
+        "seeds": [*SCORES, "average_precision", "tower_precision", "tower_recall"],
+        "models": SCORES,
+        "whole_towers": ["tau_precision", "towers_f05"],
+        "tower_scores": ["precision", "recall"],
+    }.items():
+        table = pd.read_csv(tmp_path / f"{name}.csv")
+        assert len(table) and table[list(columns)].isna().all(axis=None), name
+
+
+def test_the_times_of_a_study_stand_in_a_table_of_their_own(results: Results, thesis: Thesis):
+    study = StudySettings(name="s", title="t", place="5.3", asks="?", seeds=(0, 1),
+                          variants=({"name": "A"}, {"name": "E"}))  # fmt: skip
+    rows = [
+        {"variant": v, "seed": s, "training_seconds": 2.0 + s, "inference_ms": 5.0}
+        for v in "AE"
+        for s in (0, 1)
+    ]
+    folder = results.folder / "study" / "s"
+    folder.mkdir(parents=True)
+    pd.DataFrame(rows).to_csv(folder / "times.csv", index=False)
+    found = experiment_times(replace(results, studies=[study]))
+    a = row(found, case="A")
+    assert (a["experiment"], a["n_trainings"], a["training_seconds"]) == ("s", 2, 2.5)
+    assert (a["training_seconds_std"], a["inference_ms"]) == (pytest.approx(0.5**0.5), 5.0)

@@ -20,6 +20,7 @@ from mlflow.entities import ViewType
 
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
+from scenenet.experiments.run_tables import TIMES
 from scenenet.experiments.studies.run import COLUMNS
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
@@ -304,12 +305,11 @@ def test_a_store_made_anew_has_another_id_and_the_old_record_is_refused(
     create_store(settings, tmp_path / "store.json")
     assert store_id(settings.uri) == before
     (tmp_path / "mlflow.db").unlink()
-    assert store_id(settings.uri) is None
     shutil.copyfile(empty_database, tmp_path / "mlflow.db")
     # As a later run of the workflow does: MLflow keeps a deleted database open within a process.
     assert create_in_a_process_of_its_own(tmp_path, "other.json").wait(120) == 0
     assert store_id(settings.uri) not in (None, before)
-    with pytest.raises(InputError, match=r"store\.json: the MLflow store .* is not the one"):
+    with pytest.raises(InputError, match=r"mlflow\.db: is not the MLflow store that .*store\.json"):
         log(settings, results, tmp_path)
 
 
@@ -344,6 +344,11 @@ def test_a_store_of_another_version_is_refused_and_left_as_it_is(
     shutil.copyfile(empty_database, database)
     connection = sqlite3.connect(database)
     connection.execute("UPDATE alembic_version SET version_num = ?", (revision,))
+    # Every store that was used has an experiment; one without is taken for half made.
+    connection.execute(
+        "INSERT INTO experiments (experiment_id, name, artifact_location, lifecycle_stage) "
+        "VALUES (7, 'theirs', 'elsewhere', 'active')"
+    )
     connection.commit()
     connection.close()
     before = database.read_bytes()
@@ -357,7 +362,7 @@ def test_a_file_that_is_no_store_is_refused(tmp_path):
     database = tmp_path / "mlflow.db"
     database.write_text("tower")
     settings = TrackingSettings(uri=f"sqlite:///{database}")
-    with pytest.raises(InputError, match=r"mlflow\.db: is not an SQLite database"):
+    with pytest.raises(InputError, match=r"mlflow\.db: is damaged, or is not an SQLite database"):
         create_store(settings, tmp_path / "store.json")
     assert database.read_text() == "tower"
 
@@ -384,7 +389,7 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(
         name="ablations", title="t", place="Table 5.5", asks="Which?", seeds=(0, 1),
         variants=({"name": "A", "changes": {"geneos": ["cylinder"]}}, {"name": "E"}),
     )  # fmt: skip
-    one = dict.fromkeys(COLUMNS, 0.5) | {"kind": "cnn", "lowest_weight": float("nan")}
+    one = dict.fromkeys((*COLUMNS, *TIMES), 0.5) | {"kind": "cnn", "lowest_weight": float("nan")}
     rows = [one | {"variant": v, "seed": s, "f05": 0.2 + s / 10} for v in "AE" for s in (0, 1)]
     table = pd.DataFrame(rows)
     own = experiment_of(settings, study.name)
@@ -427,6 +432,16 @@ def test_a_study_has_an_experiment_of_its_own_with_a_parent_for_each_variant(
     assert picture.path == "figures/study-ablations.png"
     again = log_runs(own, groups, tmp_path / "runs.json")
     assert {run["status"] for run in again["runs"].values()} == {"kept"}
+    # Another run of the same study takes another time and has the same scores.
+    slower = study_groups(study, table.assign(training_seconds=9.0), "toys", "20/10/70", made)
+    later = log_runs(own, slower, tmp_path / "runs.json")
+    for key, run in later["runs"].items():
+        first = written["runs"][key]
+        assert run["status"] == "logged" and run["digest"] != first["digest"]
+        assert run["scores"] == first["scores"]
+        assert client.get_run(run["run_id"]).data.tags["scenenet.scores"] == run["scores"]
+    better = study_groups(study, table.assign(f05=0.9), "toys", "20/10/70", made)
+    assert better[0].parent.scores() != slower[0].parent.scores()
 
 
 def test_the_best_seed_is_in_the_registry_and_predicts_a_batch_of_any_size(

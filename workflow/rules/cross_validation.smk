@@ -7,6 +7,7 @@ rule cross_validation:
         manifests=every("voxels", "manifest"),
     output:
         runs=f"{R}/cross_validation/{{contender}}/runs.csv",
+        times=f"{R}/cross_validation/{{contender}}/times.csv",
         provenance=f"{R}/cross_validation/{{contender}}/provenance.json",
     log:
         f"{R}/logs/cross_validation/{{contender}}.log",

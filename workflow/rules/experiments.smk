@@ -1,12 +1,14 @@
-"""What all experiments share: one table of the trainings of all jobs."""
+"""What all experiments share: one table of the trainings of all jobs, and one of their times."""
 
 # Experiment -> the tables of its jobs. A new experiment is a rule and an entry here.
 RUNS = {name: every(name, "runs") for name in EXPERIMENTS}
+RUN_TIMES = {name: every(name, "times") for name in EXPERIMENTS}
 
 
 rule join_runs:
     input:
         runs=lambda w: RUNS[w.experiment],
+        times=lambda w: RUN_TIMES[w.experiment],
     output:
         runs=in_report(
             f"{R}/{{experiment}}/runs.csv",
@@ -15,6 +17,7 @@ rule join_runs:
             "Trainings",
             lambda w: {"table": f"{TABLE_TITLES[w.experiment][0]}, each training"},
         ),
+        times=f"{R}/{{experiment}}/times.csv",
         provenance=f"{R}/{{experiment}}/provenance.json",
     log:
         f"{R}/logs/join_runs/{{experiment}}.log",

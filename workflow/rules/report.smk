@@ -31,7 +31,7 @@ rule resolved_config:
 rule report:
     input:
         crops=every("interactive_crop", "crop"),
-        tables=[*every("tables", "tables"), *every("tables", "comparison")],
+        tables=[*every("tables", "tables"), *every("tables", "comparisons")],
         pictures=every_picture("pictures"),
         captions=every_picture("captions"),
         scores=every("evaluate", "scores"),

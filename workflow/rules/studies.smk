@@ -13,6 +13,7 @@ rule study:
             "Trainings",
             lambda w: {"study": w.study, "asks": title_of_study(w.study)},
         ),
+        times=f"{R}/study/{{study}}/times.csv",
         provenance=f"{R}/study/{{study}}/provenance.json",
     log:
         f"{R}/logs/study/{{study}}.log",

@@ -13,15 +13,19 @@ rule tables:
         tunings=every("tune", "tuning"),
         models=every("tune", "model"),
         scores=every("evaluate", "scores"),
-        studies=every("study", "runs"),
-        experiments=every("join_runs", "runs"),
+        studies=[*every("study", "runs"), *every("study", "times")],
+        experiments=[*every("join_runs", "runs"), *every("join_runs", "times")],
         boosted_trees=[*every("boosted_trees", "scores"), *every("boosted_trees", "times")],
         certificates=every("certificate", "certificate"),
         inference_time=every("inference_time", "times"),
         thesis=ancient(own_file(settings.thesis)),
     output:
         tables=[table_in_report(f"{R}/tables/{name}.csv") for name in table_names()],
-        comparison=table_in_report(f"{R}/tables/thesis_and_ours.csv"),
+        comparisons=[
+            table_in_report(f"{R}/tables/{name}.csv")
+            for name in (COMPARISON, TIMES_COMPARISON)
+        ],
+        scores=f"{R}/tables/scores.json",
         provenance=f"{R}/tables/provenance.json",
     log:
         f"{R}/logs/tables.log",

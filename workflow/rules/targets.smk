@@ -10,7 +10,7 @@ from snakemake.io import is_flagged
 
 from scenenet.figures import plan
 from scenenet.results.folder import Results
-from scenenet.results.tables import TABLES
+from scenenet.results.tables import COMPARISON, TABLES, TIMES_COMPARISON
 
 
 def every(stage, output, **values):
@@ -70,7 +70,7 @@ def every_picture(output):
 
 
 def table_names():
-    """Stems of the tables of a run, apart from the comparison with the thesis."""
+    """Stems of the tables of a run, apart from the comparisons with the thesis."""
     return [*TABLES, *(f"study-{study}" for study in VALUES["study"]), *EXPERIMENTS]
 
 

@@ -81,6 +81,7 @@ rule track_studies:
         **pictures(f"study-{study}" for study in VALUES["study"]),
         store=f"{R}/mlflow/store.json",
         runs=every("study", "runs"),
+        times=every("study", "times"),
         records=every("study", "provenance"),
     output:
         runs=expand(f"{R}/mlflow/study-{{study}}.json", study=VALUES["study"]),
@@ -113,6 +114,7 @@ rule track_experiment:
     input:
         store=f"{R}/mlflow/store.json",
         runs=f"{R}/{{experiment}}/runs.csv",
+        times=f"{R}/{{experiment}}/times.csv",
         joined=f"{R}/{{experiment}}/provenance.json",
         record=lambda w: every(w.experiment, "provenance")[0],
         pictures=f"{R}/figures/{{experiment}}.png",

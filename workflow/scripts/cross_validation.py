@@ -17,6 +17,7 @@ def cross_validation(job: _job.Job) -> None:
         job.settings["neighbour"],
         DetectionSettings(**job.settings["detection"]),
         job.output.runs,
+        job.output.times,
     )
 
 

@@ -1,4 +1,4 @@
-"""Join the runs of the jobs of an experiment into one table, in the order of the jobs."""
+"""Join the runs and the times of the jobs of an experiment, in the order of the jobs."""
 
 import _job
 
@@ -9,8 +9,10 @@ def join_runs(job: _job.Job) -> None:
     from scenenet.core.files import atomic
     from scenenet.results.folder import read_table
 
-    with atomic(job.output.runs) as partial:
-        pd.concat([read_table(runs) for runs in job.input.runs]).to_csv(partial, index=False)
+    for name in ("runs", "times"):
+        tables = [read_table(path) for path in getattr(job.input, name)]
+        with atomic(getattr(job.output, name)) as partial:
+            pd.concat(tables).to_csv(partial, index=False)
 
 
 _job.run(join_runs)

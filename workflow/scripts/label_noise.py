@@ -15,6 +15,7 @@ def label_noise(job: _job.Job) -> None:
         VoxelSettings(**job.identity["voxels"]),
         job.identity["seed"],
         job.output.runs,
+        job.output.times,
     )
 
 

@@ -17,6 +17,7 @@ def study(job: _job.Job) -> None:
         VoxelSettings(**job.identity["voxels"]),
         SplitSettings(**job.identity["split"]),
         job.output.runs,
+        job.output.times,
     )
 
 

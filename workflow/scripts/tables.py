@@ -5,13 +5,20 @@ from _results import results_of
 
 
 def tables(job: _job.Job) -> None:
+    from pathlib import Path
+
+    from scenenet.core.files import write_json
     from scenenet.experiments.published import read_thesis
-    from scenenet.results.tables import write_tables
+    from scenenet.results.tables import digest_scores, write_tables
     from scenenet.results.thesis_comparison import write_comparison
 
     results, thesis = results_of(job), read_thesis(job.input.thesis)
-    write_tables(results, thesis, results.folder / "tables")
-    write_comparison(results, thesis, job.output.comparison)
+    folder = results.folder / "tables"
+    written = write_tables(results, thesis, folder)
+    comparisons = [Path(path) for path in job.output.comparisons]
+    write_comparison(results, thesis, *comparisons)
+    names = [path.stem for path in (*written, *comparisons)]
+    write_json(job.output.scores, digest_scores(folder, names))
 
 
 _job.run(tables)

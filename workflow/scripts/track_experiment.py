@@ -6,6 +6,7 @@ import _job
 def track_experiment(job: _job.Job) -> None:
     from pathlib import Path
 
+    from scenenet.experiments.run_tables import with_times
     from scenenet.figures import read_pictures
     from scenenet.results.folder import read_result, read_table
     from scenenet.tracking import TrackingSettings, experiment_of, log_runs
@@ -17,7 +18,8 @@ def track_experiment(job: _job.Job) -> None:
     records = [read_result(Path(path)) for path in (job.input.joined, job.input.record)]
     pictures = read_pictures(Path(job.input.pictures).parent, [experiment])
     origin = origin_of(job.identity["dataset"], *records, pictures)
-    groups = EXPERIMENT_GROUPS[experiment](read_table(job.input.runs), origin)
+    runs = with_times(read_table(Path(job.input.runs)), read_table(Path(job.input.times)))
+    groups = EXPERIMENT_GROUPS[experiment](runs, origin)
     log_runs(settings, groups, job.output.runs, job.input.store, experiment_note(experiment))
 
 

@@ -6,6 +6,7 @@ import _job
 def track_studies(job: _job.Job) -> None:
     from pathlib import Path
 
+    from scenenet.experiments.run_tables import with_times
     from scenenet.experiments.studies.settings import StudySettings
     from scenenet.figures import read_pictures
     from scenenet.results.folder import read_result, read_table
@@ -14,11 +15,12 @@ def track_studies(job: _job.Job) -> None:
 
     settings = TrackingSettings(**job.settings)
     studies = [StudySettings(**study) for study in job.identity["studies"]]
-    files = zip(job.input.runs, job.input.records, job.input.pictures, job.output.runs, strict=True)
-    for study, (runs, record, picture, logged) in zip(studies, files, strict=True):
+    made = (job.input.runs, job.input.times, job.input.records, job.input.pictures)
+    files = zip(*made, job.output.runs, strict=True)
+    for study, (runs, times, record, picture, logged) in zip(studies, files, strict=True):
         groups = study_groups(
             study,
-            read_table(runs),
+            with_times(read_table(Path(runs)), read_table(Path(times))),
             job.identity["dataset"],
             job.identity["protocol"],
             read_result(Path(record)),

@@ -12,18 +12,18 @@ from typing import Any
 
 import pandas as pd
 
-from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.folds import folds
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.detection.settings import DetectionSettings
+from scenenet.experiments.run_tables import write_runs
 from scenenet.experiments.train_and_tune import train_and_tune
 from scenenet.metrics.score_columns import AT_TAU, SCORES, WHOLE_TOWERS
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
 
 COLUMNS = (
     "model", "voxels", "seed", "fold", "crops", "training_crops", "alive", "tau", *SCORES,
-    "tp", "fp", "fn", "tn", "training_f05", "parameters", "training_seconds",
+    "tp", "fp", "fn", "tn", "training_f05", "parameters",
 )  # fmt: skip
 
 
@@ -35,6 +35,7 @@ def cross_validate(
     neighbour: float,
     detection: DetectionSettings,
     out: str | Path,
+    out_times: str | Path,
 ) -> pd.DataFrame:
     """Train one model from every seed on every fold and score it on the crops left out.
 
@@ -48,18 +49,16 @@ def cross_validate(
         leave_out, neighbour: as for ``scenenet.dataset.folds.folds``.
         detection: what makes a tower; the same for every model.
         out: CSV file, columns ``COLUMNS``; ``training_f05`` is on the crops that tau was chosen on.
+        out_times: CSV file, columns model, seed, fold and training_seconds (s).
 
     Returns:
-        the table that was written.
+        the table of scores.
 
     Raises:
         InputError: there are too few crops, or no training crop has a tower.
     """
     rows = run_folds(load(voxel_manifests), model, seeds, leave_out, neighbour, detection)
-    table = pd.DataFrame(rows)[list(COLUMNS)]
-    with atomic(out) as partial:
-        table.to_csv(partial, index=False, float_format="%.6g")
-    return table
+    return write_runs(rows, COLUMNS, ("model", "seed", "fold"), out, out_times)
 
 
 def run_folds(

@@ -26,8 +26,7 @@ def summarise_folds(runs: pd.DataFrame) -> pd.DataFrame:
         model, voxels, n_seeds, n_folds, crops; live_share of the trainings; each score as the mean
         over folds and seeds, and its spread ``_std``: the standard deviation over seeds of the mean
         over folds; ``pooled_`` scores of the counts of all folds together, mean over seeds, with
-        their ``_std``; worst_fold_f05, best_fold_f05: means over seeds; parameters,
-        training_seconds.
+        their ``_std``; worst_fold_f05, best_fold_f05: means over seeds; parameters.
     """
     rows = []
     for (model, voxels), group in runs.groupby(list(CASE), sort=False):
@@ -50,8 +49,7 @@ def summarise_folds(runs: pd.DataFrame) -> pd.DataFrame:
             row |= {f"pooled_{name}": pooled[name].mean(), f"pooled_{name}_std": pooled[name].std()}
         of_folds = group.groupby("fold")["f05"].mean()
         row |= {"worst_fold_f05": of_folds.min(), "best_fold_f05": of_folds.max()}
-        for name in ("parameters", "training_seconds"):
-            row[name] = group[name].mean()
+        row["parameters"] = group["parameters"].mean()
         rows.append(row)
     return pd.DataFrame(rows)
 

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings
 from scenenet.experiments.label_noise.corridor import NoisyLine, noisy_lines
 from scenenet.experiments.label_noise.settings import AGAINST, LABELS, LabelNoiseSettings
+from scenenet.experiments.run_tables import write_runs
 from scenenet.experiments.train_and_tune import TunedModel, train_and_tune
 from scenenet.metrics.score_columns import TOWER_ONLY_SCORES
 from scenenet.metrics.voxel_scores import Confusion
@@ -29,7 +29,6 @@ COLUMNS = (
     "level", "share", "strength", "seed", "model", "alive", "tau",
     *(f"{against}_{score}" for against in AGAINST for score in TOWER_ONLY_SCORES),
     "wrong_detected", "validation_f05", "training_crops", "test_crops", "parameters",
-    "training_seconds",
 )  # fmt: skip
 
 
@@ -75,6 +74,7 @@ def train_with_label_noise(
     voxels: VoxelSettings,
     seed: int,
     out: str | Path,
+    out_times: str | Path,
 ) -> pd.DataFrame:
     """Train every model from one seed at every level of noise, and write a row for each.
 
@@ -87,19 +87,17 @@ def train_with_label_noise(
         voxels: grid of the crops.
         seed: of the line and of every training.
         out: CSV file, columns ``COLUMNS``.
+        out_times: CSV file, columns level, seed, model and training_seconds (s).
 
     Returns:
-        the table that was written.
+        the table of scores.
 
     Raises:
         InputError: a level cannot be reached, or no training crop has a tower.
     """
     lines = noisy_lines(settings.line_of(seed), settings.levels, voxels)
     rows = list(_rows(lines, settings, models, seed))
-    table = pd.DataFrame(rows)[list(COLUMNS)]
-    with atomic(out) as partial:
-        table.to_csv(partial, index=False, float_format="%.6g")
-    return table
+    return write_runs(rows, COLUMNS, ("level", "seed", "model"), out, out_times)
 
 
 def _rows(

@@ -27,7 +27,7 @@ def summarise_label_noise(runs: pd.DataFrame) -> pd.DataFrame:
         mean and bounds over the lines; strength; mean and ``_std`` over the seeds of each score
         against the labels and against the truth, and of ``wrong_detected``; gain, gain_std: F0.5 of
         a model against the truth, minus F0.5 of the labels of the same line; better_seeds: number
-        of seeds with a positive gain; parameters, training_seconds.
+        of seeds with a positive gain; parameters.
     """
     own = runs[runs["model"] == LABELS].set_index(["level", "seed"])["truth_f05"]
     rows = []
@@ -49,8 +49,7 @@ def summarise_label_noise(runs: pd.DataFrame) -> pd.DataFrame:
             gain = gain.dropna()
             row |= {"gain": gain.mean(), "gain_std": gain.std()}
             row["better_seeds"] = int((gain > 0).sum())
-        for name in ("parameters", "training_seconds"):
-            row[name] = group[name].mean()
+        row["parameters"] = group["parameters"].mean()
         rows.append(row)
     table = pd.DataFrame(rows).astype({"better_seeds": "Int64"})
     return table.sort_values("level", kind="stable", ignore_index=True)

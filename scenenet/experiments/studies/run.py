@@ -13,12 +13,12 @@ import pandas as pd
 import torch
 
 from scenenet.core.errors import InputError
-from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.batches import batch
 from scenenet.dataset.crops import read_crops
 from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings, voxelise
+from scenenet.experiments.run_tables import write_runs
 from scenenet.experiments.studies.settings import Plan, StudySettings
 from scenenet.metrics.score_columns import SCORES
 from scenenet.metrics.threshold_curve import ThresholdCurve
@@ -33,7 +33,7 @@ from scenenet.training.train import LostTraining, fit
 COLUMNS = (
     "variant", "seed", "kind", "alive", "tau", *SCORES,
     "average_precision", "validation_f05", "training_crops", "parameters", "epochs", "loss",
-    "lowest_weight", "lowest_shape", "training_seconds", "inference_ms",
+    "lowest_weight", "lowest_shape",
 )  # fmt: skip
 
 LOWEST = ("lowest_weight", "lowest_shape")
@@ -46,6 +46,7 @@ def run_study(
     voxels: VoxelSettings,
     split: SplitSettings,
     out: str | Path,
+    out_times: str | Path,
 ) -> pd.DataFrame:
     """Train and score every variant from every seed, and write a row for each.
 
@@ -59,9 +60,10 @@ def run_study(
         model, voxels, split: the settings that the variants change.
         out: CSV file, columns ``COLUMNS``; ``lowest_weight`` and ``lowest_shape`` are the lowest
             mixing weight and shape parameter of a SCENE-Net after training.
+        out_times: CSV file, columns variant, seed, training_seconds (s) and inference_ms.
 
     Returns:
-        the table that was written.
+        the table of scores.
 
     Raises:
         InputError: there are too few crops, or a variant cannot be trained.
@@ -84,10 +86,7 @@ def run_study(
             rows.append(row | _nothing_found(scored))
         else:
             rows.append(row | _scores(_applied(result, plan), plan, validation, scored))
-    table = pd.DataFrame(rows)[list(COLUMNS)]
-    with atomic(out) as partial:
-        table.to_csv(partial, index=False, float_format="%.6g")
-    return table
+    return write_runs(rows, COLUMNS, ("variant", "seed"), out, out_times)
 
 
 class _Crops:

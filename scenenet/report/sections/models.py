@@ -129,4 +129,22 @@ def training(context: ReportContext) -> Section | None:
             "seed)."
         )
         blocks = [table(frame, columns, caption, "tables/times.csv"), *blocks]
+    blocks += _experiment_times(context)
     return Section("training", "Training", blocks) if blocks else None
+
+
+def _experiment_times(context: ReportContext) -> list[Block]:
+    """Times of the studies and experiments; apart from their scores, which do not differ between
+    equal runs."""
+    frame = context.table("experiment_times")
+    if frame is None:
+        return []
+    columns = [
+        Column("experiment", "study or experiment"),
+        Column("case", "variant or model"),
+        Column("n_trainings", "trainings", "count"),
+        Column("training_seconds", "one training", "seconds", "training_seconds_std"),
+        Column("inference_ms", "one crop [ms]", "number"),
+    ]
+    caption = "Times of the trainings of the studies and experiments, mean ± standard deviation."
+    return [table(frame, columns, caption, "tables/experiment_times.csv", folded=True)]

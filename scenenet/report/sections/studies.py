@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from scenenet.experiments.studies.findings import findings
 from scenenet.report.blocks import Block, Column, Facts, Figure, Heading, Section, Text, table
 from scenenet.report.context import VOXEL_SCORES, ReportContext, with_published
@@ -38,7 +40,6 @@ def studies(context: ReportContext) -> Section | None:
             Column("parameters", "parameters", "count"),
             *(NEGATIVE if frame["negative_share"].max() > 0 else ()),
             Column("training_crops", "crops", "count"),
-            Column("training_seconds", "training", "seconds"),
         ]
         caption = (
             f"Scores on the {study.part} crops, mean ± standard deviation over "
@@ -59,6 +60,9 @@ def thesis_and_ours(context: ReportContext) -> Section | None:
     frame = context.table("thesis_and_ours")
     if frame is None:
         return None
+    times = context.table("thesis_and_ours_times")
+    if times is not None:
+        frame = pd.concat([frame, times], ignore_index=True)
     counts = frame["verdict"].value_counts()
     facts = [(verdict, str(counts.get(verdict, 0))) for verdict in VERDICTS]
     columns = [
@@ -79,5 +83,6 @@ def thesis_and_ours(context: ReportContext) -> Section | None:
         "with the mean over all seeds."
     )
     shown = frame.fillna({"unit": "", "remark": ""})
-    found = table(shown, columns, caption, "tables/thesis_and_ours.csv", folded=True)
+    source = "tables/thesis_and_ours.csv, tables/thesis_and_ours_times.csv"
+    found = table(shown, columns, caption, source, folded=True)
     return Section("thesis", "Thesis and this run", [Facts(facts), found])

@@ -43,8 +43,12 @@ def manifest(tmp_path_factory):
 
 def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     thesis = models[1]
-    both = cross_validate([manifest], thesis, (0, 1), 2, 0.0, DETECTION, tmp_path / "runs.csv")
-    assert tuple(pd.read_csv(tmp_path / "runs.csv").columns) == COLUMNS == tuple(both.columns)
+    files = tmp_path / "runs.csv", tmp_path / "times.csv"
+    both = cross_validate([manifest], thesis, (0, 1), 2, 0.0, DETECTION, *files)
+    assert tuple(pd.read_csv(files[0]).columns) == COLUMNS == tuple(both.columns)
+    times = pd.read_csv(files[1])
+    assert list(times.columns) == ["model", "seed", "fold", "training_seconds"]
+    assert list(times["fold"]) == [1, 2, 3, 1, 2, 3] and (times["training_seconds"] > 0).all()
     of_towers = both["voxels"] == WHOLE_TOWERS
     table, whole = both[~of_towers], both[of_towers]
     assert set(both["model"]) == {thesis.name}

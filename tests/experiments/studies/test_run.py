@@ -132,6 +132,10 @@ def test_a_study_without_variants_is_refused():
         study(variants=[{"name": "a"}, {"name": "a"}])
 
 
+def files(folder):
+    return folder / "runs.csv", folder / "times.csv"
+
+
 def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
     trained = []
     original = run.fit
@@ -143,17 +147,21 @@ def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
             {"name": "cylinder", "changes": {"geneos": ["cylinder"]}},
         ]
     )
-    table = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    table = run_study(crops, defined, MODEL, GRID, SPLIT, *files(tmp_path))
     assert len(table) == 6
     assert len(trained) == 4  # the smaller kernels are sampled from the same trainings
     assert list(table["parameters"]) == [11, 11, 11, 11, 2, 2]
     read = pd.read_csv(tmp_path / "runs.csv")
     assert tuple(read.columns) == COLUMNS
+    times = pd.read_csv(tmp_path / "times.csv")
+    assert list(times.columns) == ["variant", "seed", "training_seconds", "inference_ms"]
+    assert len(times) == 6 and (times[["training_seconds", "inference_ms"]] > 0).all(axis=None)
     scores = table.set_index(["variant", "seed"])[["precision", "recall", "f05", "tau", "loss"]]
-    again = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "again.csv")
+    again = run_study(crops, defined, MODEL, GRID, SPLIT, *files(tmp_path / "again"))
     pd.testing.assert_frame_equal(
         scores, again.set_index(["variant", "seed"])[list(scores)], check_exact=True
     )
+    assert (tmp_path / "again" / "runs.csv").read_bytes() == (tmp_path / "runs.csv").read_bytes()
     assert scores.loc[("as trained", 0), "loss"] == scores.loc[("smaller", 0), "loss"]
     assert scores["f05"].nunique() > 1
 
@@ -174,7 +182,7 @@ def test_models_of_other_kinds_are_trained_and_scored_too(crops, tmp_path):
             },
         ],
     )  # fmt: skip
-    table = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    table = run_study(crops, defined, MODEL, GRID, SPLIT, *files(tmp_path))
     rows = {row["variant"]: row for row in table.to_dict("records")}
     assert {name: row["kind"] for name, row in rows.items()} == {
         "ranges": "scenenet", "none": "scenenet", "cnn": "cnn", "metres": "scenenet",
@@ -193,7 +201,7 @@ def test_models_of_other_kinds_are_trained_and_scored_too(crops, tmp_path):
 def test_a_diverged_training_counts_as_dead_and_the_others_continue(crops, tmp_path):
     lost = {"training.learning_rate": 1e30, "training.optimiser": "sgd", "training.epochs": 4}
     defined = study(variants=[{"name": "lost", "changes": lost}, {"name": "kept"}])
-    table = run_study(crops, defined, MODEL, GRID, SPLIT, tmp_path / "runs.csv")
+    table = run_study(crops, defined, MODEL, GRID, SPLIT, *files(tmp_path))
     diverged = table[table["variant"] == "lost"]
     assert len(table) == 4
     assert diverged["loss"].isna().all()

@@ -12,12 +12,12 @@ from scenenet.experiments.cross_validation import run as cross_validation
 from scenenet.experiments.label_noise.run import COLUMNS
 from scenenet.experiments.label_noise.settings import LABELS
 from scenenet.experiments.registry import EXPERIMENTS
+from scenenet.experiments.run_tables import with_times
 from scenenet.figures import draw_all, plan
 from scenenet.figures.experiments import EXPERIMENT_DRAWINGS
 from scenenet.metrics.score_columns import AT_TAU, WHOLE_TOWERS
 from scenenet.report.context import ReportContext
 from scenenet.report.page import SECTIONS
-from scenenet.experiments.run_tables import with_times
 from scenenet.report.sections import experiments as experiment_sections
 from scenenet.report.sections.experiments import EXPERIMENT_SECTIONS
 from scenenet.results.tables import write_tables

@@ -186,7 +186,7 @@ def test_each_verified_property_of_each_model_has_a_row(results: Results, thesis
 
 
 def test_every_table_is_written_and_reads_back(results: Results, thesis: Thesis, tmp_path: Path):
-    paths = tables.write_tables(results, thesis, tmp_path / "tables")
+    paths = tables.write_tables(with_a_timed_study(results), thesis, tmp_path / "tables")
     assert {path.stem for path in paths} == set(tables.TABLES)
     for path in paths:
         assert len(pd.read_csv(path)) > 0, path.name
@@ -312,7 +312,8 @@ def test_a_score_that_is_not_defined_is_empty_in_every_table_and_no_zero(
         assert len(table) and table[list(columns)].isna().all(axis=None), name
 
 
-def test_the_times_of_a_study_stand_in_a_table_of_their_own(results: Results, thesis: Thesis):
+def with_a_timed_study(results: Results) -> Results:
+    """The results with the times of a study of two variants and two seeds."""
     study = StudySettings(name="s", title="t", place="5.3", asks="?", seeds=(0, 1),
                           variants=({"name": "A"}, {"name": "E"}))  # fmt: skip
     rows = [
@@ -323,7 +324,11 @@ def test_the_times_of_a_study_stand_in_a_table_of_their_own(results: Results, th
     folder = results.folder / "study" / "s"
     folder.mkdir(parents=True)
     pd.DataFrame(rows).to_csv(folder / "times.csv", index=False)
-    found = experiment_times(replace(results, studies=[study]))
+    return replace(results, studies=[study])
+
+
+def test_the_times_of_a_study_stand_in_a_table_of_their_own(results: Results):
+    found = experiment_times(with_a_timed_study(results))
     a = row(found, case="A")
     assert (a["experiment"], a["n_trainings"], a["training_seconds"]) == ("s", 2, 2.5)
     assert (a["training_seconds_std"], a["inference_ms"]) == (pytest.approx(0.5**0.5), 5.0)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
+import sqlite3
 
 import pytest
 
@@ -42,6 +44,8 @@ FROM_CROPS = {**LEARNED, "voxelisation_time": 1}
 SETTINGS = {"resolved_config": 1}
 """The resolved configuration is written after each change of a setting."""
 
+
+MISSING = re.compile(r"Missing output files: ([^;\n]+)")
 
 # Surveys
 
@@ -258,6 +262,66 @@ def test_editing_a_script_runs_its_rule(project):
 # Results
 
 
+def test_every_result_file_is_a_target(project):
+    """Snakemake makes a missing file again only if it is a target, or if a job that runs reads it.
+
+    One dry run shows the targets; to delete each of 200 files in turn would take an hour.
+    """
+    (project.results / "report/index.html").unlink()
+    shown = project.run("-n", "--quiet", "host")
+    block = shown.partition("rule all:")[2].partition("input: ")[2].partition("\n")[0]
+    targets = set(block.split(", "))
+    written = {
+        path.relative_to(project.folder).as_posix()
+        for path in project.results.rglob("*")
+        if path.is_file()
+    }
+    # Results are complete without synthetic surveys; they are made again for a job that reads them.
+    others = ("logs", "benchmarks", "synthetic")
+    results = {path for path in written if path.split("/")[1] not in others}
+    assert len(results) > 150
+    assert results - targets == set()
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        # Nothing but the report depends on these.
+        (
+            "check/own/report.json",
+            "figures/surveys.png",
+            "figures/labels-first.json",
+            "interactive_crop/best.json",
+            "inference_time/cnn.json",
+            "certificate/scenenet.json",
+            "tables/seeds.csv",
+            "tables/scores.json",
+            "mlflow/registry.json",
+            "train/cnn/seed-0/resources.json",
+            "predict/own/own.towers.geojson",
+            "study/ablations/times.csv",
+            "label_noise/times.csv",
+            "config.yaml",
+        ),
+        ("towers/first/towers.csv", "evaluate/scenenet/seed-1.provenance.json"),
+        ("split/split.csv", "tune/cnn/seed-0.json", "models/cnn.safetensors"),
+    ],
+)
+def test_deleted_results_are_missed(project, files):
+    for file in files:
+        (project.results / file).unlink()
+    shown = project.run("-n", "--quiet", "host")
+    missed = set(re.findall(r"results/[^\s,;]+", "".join(MISSING.findall(shown))))
+    assert {f"results/{file}" for file in files} <= missed
+
+
+def test_a_deleted_synthetic_survey_is_made_again_for_the_job_that_reads_it(project):
+    (project.results / "synthetic/first.laz").unlink()
+    assert project.planned() == {}
+    (project.results / "check/first/report.json").unlink()
+    assert project.planned()["synthesize"] == 1
+
+
 @pytest.mark.parametrize("file", ["crops.zarr.zip", "manifest.json"])
 def test_a_deleted_store_or_manifest_is_made_again(project, file):
     (project.results / "crops/first" / file).unlink()
@@ -286,6 +350,27 @@ def test_a_deleted_mlflow_store_is_made_again_with_all_its_runs(project):
     (project.folder / "mlflow.db").unlink()
     logged = {"track": 1, "track_studies": 1, "track_experiment": 1, "register": 1}
     assert project.planned() == {"mlflow_store": 1, **logged, "report": 1}
+
+
+def test_an_emptied_mlflow_store_is_made_again_with_all_its_runs(project):
+    (project.folder / "mlflow.db").write_bytes(b"")
+    assert project.planned()["mlflow_store"] == 1
+
+
+def test_a_store_that_cannot_be_made_loses_no_run_of_others(project):
+    """Snakemake restores or deletes the outputs of a job that fails; the database is none."""
+    script = project.folder / "workflow/scripts/mlflow_store.py"
+    script.write_text(
+        "import sqlite3\n"
+        "with sqlite3.connect('mlflow.db') as store:\n"
+        "    store.execute(\"UPDATE experiments SET name = 'by another' WHERE name = 'Default'\")\n"
+        "raise SystemExit('stopped')\n"
+    )
+    assert project.snakemake("--until", "mlflow_store").returncode == 1
+    with sqlite3.connect(project.folder / "mlflow.db") as store:
+        names = {name for (name,) in store.execute("SELECT name FROM experiments")}
+    assert "by another" in names
+    assert project.planned()["mlflow_store"] == 1
 
 
 def test_runs_that_other_users_log_to_mlflow_run_nothing(project):

@@ -4,7 +4,7 @@
 rule label_noise:
     output:
         runs=f"{R}/label_noise/seed-{{noise_seed}}.csv",
-        times=f"{R}/label_noise/seed-{{noise_seed}}.times.csv",
+        times=f"{R}/label_noise/times-seed-{{noise_seed}}.csv",
         provenance=f"{R}/label_noise/seed-{{noise_seed}}.provenance.json",
     log:
         f"{R}/logs/label_noise/seed-{{noise_seed}}.log",

@@ -23,7 +23,8 @@ from scenenet.metrics.voxel_scores import Confusion, confusion
 from scenenet.models.factory import new_model
 from scenenet.models.predictions import probabilities
 from scenenet.models.settings import ModelSettings
-from scenenet.training.train import LostTraining, fit
+from scenenet.training.gradient import LostTraining
+from scenenet.training.train import fit
 from scenenet.training.tuning import tuned_tau
 
 Predict = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]

@@ -1,18 +1,15 @@
-"""Training of protocol ``operational``: the numbers of a SCENE-Net in metres are searched for."""
+"""Training of protocol ``operational``: a search for the numbers of a SCENE-Net in metres."""
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.metrics.score_columns import or_nan
@@ -20,27 +17,24 @@ from scenenet.models.factory import new_model
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import PreparedCrop, curve_of, prepare_crops
 from scenenet.models.settings import ModelSettings, SearchSettings
+from scenenet.training import checkpoint as checkpoints
 from scenenet.training.cma_es import Score, State, advance, begin, settled
 from scenenet.training.objective import draws, scorer
 
 
-def search_metric(
+def fit_by_search(
     training: Sequence[VoxelSample],
     validation: Sequence[VoxelSample],
     settings: ModelSettings,
     seed: int,
-    identity: str,
-    *,
-    checkpoint: Path | None = None,
+    checkpoint: checkpoints.Checkpoint,
 ) -> tuple[MetricSceneNet, pd.DataFrame]:
-    """Search for the numbers of a new SCENE-Net in metres; as ``scenenet.training.train.fit``.
+    """Search for the numbers of a new SCENE-Net in metres.
 
-    A row of the history is a generation of the search: loss is 1 - F0.5 on the training crops, as
-    the search weighs it, of the best numbers so far, whose parameters follow. Several searches are
-    begun, and the rows are those of the one that was gone on with; ``search`` is its number.
-
-    Args:
-        identity: of all that a checkpoint depends on.
+    Arguments and result are those of ``scenenet.training.train.fit``. A row of the history is a
+    generation of the search: loss is 1 - F0.5 of the best numbers so far on the training crops, as
+    the search weighs it, followed by the parameters. Several searches start, and the best of them
+    continues; the rows are those of that one, and ``search`` is its number.
     """
     model = new_model(settings, seed)
     assert isinstance(model, MetricSceneNet)
@@ -53,7 +47,7 @@ def search_metric(
         model.set_numbers(state.best)
         return _row(model, state, kept, seconds)
 
-    state, history = _resume(checkpoint, identity)
+    state, history = _resume(checkpoint)
     if state is None:
         started = time.perf_counter()
         trials = [_trial(model, score, search, [seed, n]) for n in range(search.searches)]
@@ -65,14 +59,13 @@ def search_metric(
     label = f"{settings.name} seed {seed}: generations"
     for generation in track(range(state.generation + 1, search.generations + 1), label):
         started = time.perf_counter()
-        # The draws follow from these numbers alone: a resumed search draws the same.
+        # The draws depend on these numbers alone, so a resumed search draws the same.
         rng = np.random.default_rng([seed, chosen, generation])
         state = advance(state, score, search.population, rng)
         if generation == search.generations:
             state = settled(state, score)
         history.append(row(state, time.perf_counter() - started) | {"search": chosen})
-        if checkpoint is not None:
-            _save(checkpoint, identity, state, history)
+        _save(checkpoint, state, history)
     model.set_numbers(state.best)
     return model, pd.DataFrame(history)
 
@@ -80,10 +73,10 @@ def search_metric(
 def _trial(
     model: MetricSceneNet, score: Score, settings: SearchSettings, entropy: list[int]
 ) -> list[State]:
-    """The first generations of a search, its beginning included.
+    """The start and the first generations of a search.
 
-    Some searches end where the negative sphere has no weight and no draw about them is better, so
-    several are begun.
+    Some searches end with a negative sphere of weight 0, around which no draw is better. This is
+    why several searches start.
     """
     starts = draws(model, settings.starts, np.random.default_rng([*entropy, 0]))
     states = [begin(starts, score, settings.step)]
@@ -107,33 +100,19 @@ def _row(
     return row | model.shape_parameters()
 
 
-def _save(path: Path, identity: str, state: State, history: list[dict[str, float]]) -> None:
-    from safetensors.numpy import save_file
-
+def _save(
+    checkpoint: checkpoints.Checkpoint, state: State, history: list[dict[str, float]]
+) -> None:
     fields = asdict(state)
-    arrays = {k: np.ascontiguousarray(v) for k, v in fields.items() if isinstance(v, np.ndarray)}
-    plain = {k: v for k, v in fields.items() if k not in arrays}
-    metadata = {
-        "identity": identity,
-        "state": json.dumps(plain),
-        "history": json.dumps(history),
-    }
-    with atomic(path) as partial:
-        save_file(arrays, partial, metadata=metadata)
+    arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
+    plain = {name: value for name, value in fields.items() if name not in arrays}
+    checkpoint.write(checkpoints.State(arrays, {"state": plain, "history": history}))
 
 
-def _resume(path: Path | None, identity: str) -> tuple[State | None, list[dict[str, Any]]]:
-    """State and history of a checkpoint; none where none fits."""
-    if path is None or not path.is_file():
+def _resume(
+    checkpoint: checkpoints.Checkpoint,
+) -> tuple[State | None, list[dict[str, Any]]]:
+    saved = checkpoint.read()
+    if saved is None:
         return None, []
-    from safetensors import SafetensorError, safe_open
-
-    try:
-        with safe_open(path, framework="np") as stream:
-            metadata = stream.metadata() or {}
-            if metadata.get("identity") != identity or "state" not in metadata:
-                return None, []
-            arrays = {name: stream.get_tensor(name) for name in list(stream.keys())}
-    except SafetensorError:  # damaged: the search begins anew, which costs time and no result
-        return None, []
-    return State(**arrays, **json.loads(metadata["state"])), json.loads(metadata["history"])
+    return State(**saved.arrays, **saved.record["state"]), saved.record["history"]

@@ -13,7 +13,7 @@ from scenenet.dataset.voxels import VoxelGrid, VoxelSettings, voxelise
 from scenenet.models.model_file import read_model
 from scenenet.models.predictions import probabilities, threshold_curve
 from scenenet.models.settings import LossSettings, ModelSettings, TrainingSettings
-from scenenet.training import train as training
+from scenenet.training import gradient
 from scenenet.training.losses import VoxelWeights, fidelity
 from scenenet.training.train import fit, train
 
@@ -66,7 +66,7 @@ def cut_after(monkeypatch):
     """A function that makes training stop in the middle of the epoch after ``n`` whole ones."""
 
     def arrange(n: int):
-        original = training._epoch
+        original = gradient._epoch
         done = iter(range(n))
 
         def interrupted(*args):
@@ -75,7 +75,7 @@ def cut_after(monkeypatch):
                 raise PowerCut
             return original(*args)
 
-        monkeypatch.setattr(training, "_epoch", interrupted)
+        monkeypatch.setattr(gradient, "_epoch", interrupted)
         return monkeypatch.undo
 
     return arrange

@@ -28,7 +28,8 @@ from scenenet.models.factory import new_model
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import ModelSettings
-from scenenet.training.train import LostTraining, fit
+from scenenet.training.gradient import LostTraining
+from scenenet.training.train import fit
 
 COLUMNS = (
     "variant", "seed", "kind", "alive", "tau", *SCORES,

@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError, model_validator
 from scenenet.config.errors import explain
 from scenenet.core.errors import InputError
 from scenenet.core.provenance import FULL_BELOW_BYTES
-from scenenet.core.settings import NAME, Settings
+from scenenet.core.settings import NAME, PathText, Settings
 from scenenet.dataset.crops import CropSettings
 from scenenet.dataset.labelled_towers import TowerSettings
 from scenenet.dataset.split import SplitSettings
@@ -45,7 +45,7 @@ Seed = Annotated[int, Field(ge=0)]
 class NewSurveys(Settings):
     """The inbox: surveys that are only classified and need no row in the survey sheet."""
 
-    folder: str | None = Field(
+    folder: PathText | None = Field(
         "surveys", description="folder whose LAS and LAZ files are classified; null for no inbox"
     )
     codes: Codes = Field("asprs", description="class scheme of these files, if they have labels")
@@ -79,11 +79,11 @@ class Config(Settings):
     dataset: str = Field(
         "surveys", min_length=1, description="name of the data in MLflow and in the report"
     )
-    results_dir: str = Field("results", min_length=1, description="folder for every result")
-    surveys: str | None = Field(
+    results_dir: PathText = Field("results", min_length=1, description="folder for every result")
+    surveys: PathText | None = Field(
         "config/surveys.tsv", description="survey sheet; null if there are only TS40K samples"
     )
-    ts40k_dir: str | None = Field(
+    ts40k_dir: PathText | None = Field(
         None, description="folder of TS40K samples (.npy, .pt) to train on"
     )
     ts40k_codes: Codes = Field(
@@ -98,7 +98,7 @@ class Config(Settings):
         description="MiB; smaller surveys count as changed if their content changes, larger ones "
         "if their size or date changes, because reading them takes seconds",
     )
-    thesis: str = Field("config/thesis.yaml", description="published numbers to compare with")
+    thesis: PathText = Field("config/thesis.yaml", description="published numbers to compare with")
     synthetic: Synthetic = Synthetic()
     check: CheckSettings = CheckSettings()
     towers: TowerSettings = TowerSettings()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import difflib
+import errno
+import os
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -13,7 +15,7 @@ from typing import TYPE_CHECKING, Literal, cast, get_args
 from pydantic import Field
 
 from scenenet.core.errors import InputError
-from scenenet.core.settings import NAME, Settings
+from scenenet.core.settings import NAME, Settings, path_fault
 from scenenet.pointcloud.class_schemes import SCHEMES, Codes
 
 if TYPE_CHECKING:
@@ -25,6 +27,8 @@ Origin = Literal["file", "synthetic", "ts40k"]
 
 LAS_SUFFIXES = (".las", ".laz")
 SURVEY_SUFFIXES = (*LAS_SUFFIXES, ".npy", ".pt")
+LONGEST_SHOWN = 80
+"""Characters of a faulty path in a message."""
 RESULTS = "{results_dir}"
 """Placeholder for the result folder in a path of the sheet."""
 
@@ -140,7 +144,7 @@ def _read_sheet(config: Config, root: Path) -> list[Survey]:
         if len(cells) > len(header):
             found.insert(0, f"{len(cells)} columns, where the first line names {len(header)}")
         if survey is not None:
-            resolved = str((root / survey.path).resolve())
+            resolved = os.path.realpath(root / survey.path)
             for what, key in (
                 (f"the name {survey.name!r}", ("name", survey.name)),
                 (f"the file {survey.path} with this role", (survey.role, resolved)),
@@ -184,12 +188,16 @@ def _check_header(header: list[str], file: str) -> None:
 
 
 def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey | None, list[str]]:
-    """The survey of a row, or None if cells are missing, and the problems of the row."""
+    """The survey of a row, or None if a cell is missing or is no path, and the problems of the
+    row."""
     problems = [f"{name} is empty" for name in COLUMNS if not row.get(name)]
     if problems:
         return None, problems
     name, codes, role = row["survey"], row["codes"], row["role"]
-    path = str(Path(row["path"].replace(RESULTS, config.results_dir)).expanduser())
+    path = row["path"].replace(RESULTS, config.results_dir)
+    if fault := path_fault(path):
+        shown = path if len(path) <= LONGEST_SHOWN else f"{path[:LONGEST_SHOWN]}..."
+        problems.append(f"the path {shown!r} {fault}")
     if not re.match(NAME, name) or len(name) > 100:
         problems.append(
             f"survey {name!r} cannot be the name of a file: use letters, digits, '_', '-' and '.', "
@@ -199,18 +207,17 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
         problems.append(
             f"survey {name!r} ends in 20 or more repetitions, which Snakemake refuses in a name"
         )
-    if set("{}") & set(path):
-        problems.append(f"{path}: Snakemake reads {{ and }} in a path as a wildcard")
     problems += _unknown("codes", codes, tuple(SCHEMES))
     problems += _unknown("role", role, get_args(Role))
+    if fault:
+        return None, problems
+    path = str(Path(path).expanduser())
     made = {
         str(Path(config.results_dir, "synthetic", f"{survey.name}.laz"))
         for survey in config.synthetic.surveys
     }
     synthetic = path in made
-    problems += [] if synthetic else _path_problems(path, row["path"], root, config)
-    if role == "new" and (root / path).is_dir():
-        problems.append(f"{path} is a folder; samples in a folder can only be trained on")
+    problems += [] if synthetic else _path_problems(path, row["path"], role, root, config)
     origin: Origin = "synthetic" if synthetic else "file"
     # An unknown code or role is among the problems, and then the survey is not used.
     return Survey(name, path, cast(Codes, codes), cast(Role, role), origin), problems
@@ -224,11 +231,14 @@ def _unknown(column: str, value: str, known: tuple[str, ...]) -> list[str]:
     return [f"{column} {value!r} is none of {', '.join(known)}{hint}"]
 
 
-def _path_problems(path: str, written: str, root: Path, config: Config) -> list[str]:
+def _path_problems(path: str, written: str, role: str, root: Path, config: Config) -> list[str]:
     where = root / path
+    if fault := _unreachable(where):
+        return [f"{path} cannot be read: {fault}"]
     if where.is_dir():
         if any(file.suffix in (".npy", ".pt") for file in where.iterdir()):
-            return []
+            can_only = f"{path} is a folder; samples in a folder can only be trained on"
+            return [can_only] if role == "new" else []
         return [f"{path} is a folder without TS40K samples; LAS and LAZ files get a row each"]
     if where.is_file():
         if where.suffix.lower() in SURVEY_SUFFIXES:
@@ -245,6 +255,18 @@ def _path_problems(path: str, written: str, root: Path, config: Config) -> list[
     close = difflib.get_close_matches(where.name, names, n=1)
     hint = f", did you mean {Path(path).with_name(close[0])}?" if close else ""
     return [f"{path} is not there{hint}"]
+
+
+def _unreachable(where: Path) -> str | None:
+    """Why the system cannot reach ``where``; None if it can, or if nothing is there."""
+    try:
+        where.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        if where.is_symlink():
+            return f"it is a link to {where.readlink()}, which does not exist"
+    except OSError as error:
+        return "it is part of a loop of links" if error.errno == errno.ELOOP else error.strerror
+    return None
 
 
 def _ts40k(config: Config, root: Path) -> Iterator[Survey]:
@@ -267,13 +289,13 @@ def _inbox(
     programs write to a hidden file until they have finished."""
     if config.new_surveys.folder is None or not (root / config.new_surveys.folder).is_dir():
         return
-    listed = {(root / survey.path).resolve() for survey in known}
+    listed = {os.path.realpath(root / survey.path) for survey in known}
     files = [
         file
         for file in sorted((root / config.new_surveys.folder).iterdir())
         if not file.name.startswith(".")
         and file.suffix.lower() in LAS_SUFFIXES
-        and file.resolve() not in listed
+        and os.path.realpath(file) not in listed
     ]
     owners: dict[str, list[str]] = {survey.name: [survey.path] for survey in known}
     for file in files:
@@ -298,8 +320,8 @@ def _why_left_out(file: Path, name: str, owners: list[str]) -> str | None:
         owners: the files whose survey would be called ``name``. None of those in the inbox is used,
             as one would replace the results of the other.
     """
-    if not file.exists():
-        return f"it is a link to {file.readlink()}, which does not exist. Mend or remove the link"
+    if fault := _unreachable(file):
+        return f"{fault}. Mend or remove it"
     if set("{}") & set(str(file)):
         return "Snakemake reads { and } in a path as a wildcard. Rename the file"
     if REPEATED.search(name):

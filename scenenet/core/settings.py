@@ -2,13 +2,52 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, BaseModel, ConfigDict
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 """Pattern of the name of a survey, which becomes the name of a folder."""
+
+LONGEST_NAME, LONGEST_PATH = 255, 4095
+"""Bytes that Linux allows in the name of a file and in a path."""
+CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+
+
+def path_fault(text: str) -> str | None:
+    """Why ``text`` cannot be a path for the workflow; None if it can."""
+    if found := CONTROL.search(text):
+        return f"has the control character {found.group()!r}"
+    if "{" in text or "}" in text:
+        return "has a brace, which Snakemake reads as a wildcard"
+    if len(text.encode()) > LONGEST_PATH:
+        return f"has {len(text.encode())} bytes, more than the {LONGEST_PATH} of a path"
+    longest = max(len(name.encode()) for name in text.split("/"))
+    if longest > LONGEST_NAME:
+        return f"has a name of {longest} bytes, more than the {LONGEST_NAME} of a file name"
+    return None
+
+
+def _usable_path(text: str) -> str:
+    if fault := path_fault(text):
+        raise ValueError(f"the path {fault}")
+    return text
+
+
+def _drawable(text: str) -> str:
+    if "$" in text:
+        raise ValueError("has a '$', which starts a formula in a figure; remove it")
+    if found := CONTROL.search(text):
+        raise ValueError(f"has the control character {found.group()!r}; remove it")
+    return text
+
+
+PathText = Annotated[str, AfterValidator(_usable_path)]
+"""A path in the settings."""
+FigureText = Annotated[str, AfterValidator(_drawable)]
+"""A text that is drawn in figures."""
 
 
 class Settings(BaseModel):

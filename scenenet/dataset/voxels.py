@@ -18,6 +18,10 @@ MAX_VOXELS = 2**28
 """Voxels of the largest grid allowed, 16 times as many as 256^3: its probabilities take 1 GiB."""
 
 
+SMALLEST_VOXEL, LARGEST_VOXEL = 0.01, 1000.0
+"""Edges that voxels can have, m."""
+
+
 class VoxelSettings(Settings):
     """The grid of a crop."""
 
@@ -27,7 +31,12 @@ class VoxelSettings(Settings):
         "metric: as many voxels of voxel_size as the crop needs",
     )
     resolution: Literal[32, 64, 128, 256] = Field(64, description="voxels per edge, for fit cube")
-    voxel_size: float = Field(1.0, gt=0, description="edge of a voxel in m, for fit metric")
+    voxel_size: float = Field(
+        1.0,
+        ge=SMALLEST_VOXEL,
+        le=LARGEST_VOXEL,
+        description="edge of a voxel in m, for fit metric",
+    )
 
     def grid(self, xyz: np.ndarray) -> VoxelGrid:
         """The grid for points (N, 3)."""

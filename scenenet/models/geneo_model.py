@@ -123,13 +123,17 @@ class GeneoModel(VoxelModel):
         """Set the numbers that ``shape_parameters`` returns; the last mixing weight is derived.
 
         Raises:
-            InputError: a number is missing or unknown, or the mixing weights do not sum to 1.
+            InputError: a number is missing, unknown or not finite, or the mixing weights do not
+                sum to 1.
         """
         expected = self.shape_parameters()
         if missing := sorted(expected.keys() - numbers.keys()):
             raise InputError(f"parameters are missing: {', '.join(missing)}")
         if unknown := sorted(numbers.keys() - expected.keys()):
             raise InputError(f"parameters are unknown: {', '.join(unknown)}")
+        for name, number in numbers.items():
+            if not abs(number) <= torch.finfo(torch.float32).max:
+                raise InputError(f"{name} is {number:g}, not a finite number")
         total = sum(numbers[f"lambda.{name}"] for name in self.names)
         if abs(total - 1) > 1e-4:
             raise InputError(f"mixing weights sum to {total:.6f}, not to 1")

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import Field
+import torch
+from pydantic import Field, TypeAdapter, ValidationError
+from torch import Tensor
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, write_json
 from scenenet.core.settings import Settings
-from scenenet.dataset.voxels import Fit, Measurement
+from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL, Fit, Measurement
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
-from scenenet.models.settings import KernelSize, MetricSettings
+from scenenet.models.settings import LARGEST_KERNEL, KernelSize, MetricSettings
 
 FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
@@ -38,7 +41,9 @@ class ModelCard(Settings):
     fit: Fit = Field(description="kind of grid that it was trained on")
     resolution: int = Field(gt=0, description="voxels per edge of that grid, for fit cube")
     voxel_size: float = Field(
-        gt=0, description="m, median of the training crops; surveys are predicted at this size"
+        ge=SMALLEST_VOXEL,
+        le=LARGEST_VOXEL,
+        description="m, median of the training crops; surveys are predicted at this size",
     )
     tau: float | None = Field(None, gt=0, le=1, description="threshold; None before tuning")
     provenance: dict[str, Any] = Field(
@@ -72,8 +77,15 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
     """Write ``model`` to ``path`` (``.json`` for SCENE-Net, ``.safetensors`` for the CNN).
 
     Raises:
+        InputError: a number of the model is not finite.
         ValueError: the ending of ``path`` is not the one of the model's kind.
     """
+    try:
+        _require_finite(model, card)
+    except InputError as error:
+        raise InputError(
+            f"the model is not written: {error.problem}", file=path, remedy="Train it again"
+        ) from None
     model = model.at(card.voxel_size)
     head = {
         "format": FORMAT,
@@ -98,7 +110,8 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
     """Read a model file.
 
     Raises:
-        InputError: the file does not exist, or this version cannot read it.
+        InputError: the file does not exist, this version cannot read it, or a number in it is
+            not finite or out of bounds.
     """
     path = Path(path)
     if not path.is_file():
@@ -109,6 +122,14 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
         return _read_scenenet(json.loads(path.read_text(encoding="utf-8")))
     except InputError as error:
         raise InputError(error.problem, file=path, remedy=error.remedy) from None
+    except ValidationError as error:
+        fault = error.errors()[0]
+        key = ".".join(map(str, fault["loc"]))
+        raise InputError(
+            f"not a readable model file ({key} = {fault['input']!r}: {fault['msg']})",
+            file=path,
+            remedy="Correct the value, or train the model again",
+        ) from None
     except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(
             f"not a readable model file ({type(error).__name__}: {error})",
@@ -162,6 +183,7 @@ def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
     mixing = {f"lambda.{name}": float(w) for name, w in data["mixing_weights"].items()}
     model.set_shape_parameters(numbers | mixing)
     card = _card(data)
+    _require_finite(model, card)
     return model.at(card.voxel_size), card
 
 
@@ -171,14 +193,57 @@ def _read_cnn(path: Path) -> tuple[CNN, ModelCard]:
     try:
         with safe_open(path, framework="pt") as stream:
             head = json.loads((stream.metadata() or {})["model"])
-            names = list(stream.keys())
-            tensors = {name: stream.get_tensor(name) for name in names}
+            tensors = {name: stream.get_tensor(name) for name in list(stream.keys())}
     except SafetensorError as error:
         raise ValueError(str(error)) from None
     _check_head(head)
-    model = CNN(len(tensors["bias"]), _size(head))
+    size = _size(head)
+    _check_weights(tensors, size)
+    model = CNN(len(tensors["bias"]), size)
     model.load_state_dict(tensors)
-    return model, _card(head)
+    card = _card(head)
+    _require_finite(model, card)
+    return model, card
+
+
+def _check_weights(tensors: Mapping[str, Tensor], size: KernelSize) -> None:
+    """Compare the weights with the head before memory is taken for what the head claims."""
+    kernels = len(tensors["bias"]) if "bias" in tensors and tensors["bias"].dim() == 1 else 0
+    expected = {"weight": (kernels, *size), "bias": (kernels,)}
+    found = {name: tuple(tensor.shape) for name, tensor in tensors.items()}
+    if kernels < 1 or found != expected:
+        raise InputError(
+            f"the file has weights of the shapes {found}, and a CNN with kernels of "
+            f"{'x'.join(map(str, size))} voxels has weight (n, {', '.join(map(str, size))}) and "
+            "bias (n,)",
+            remedy="Name a file that scenenet train has written",
+        )
+    for name, tensor in tensors.items():
+        if tensor.dtype != torch.float32:
+            raise InputError(f"{name} has the type {tensor.dtype}, not torch.float32")
+
+
+def _require_finite(model: VoxelModel, card: ModelCard) -> None:
+    """Refuse a model that would answer NaN.
+
+    Raises:
+        InputError: a number of it, or the kernel that follows from its numbers, is not finite.
+    """
+    if isinstance(model, GeneoModel):
+        for name, number in model.shape_parameters().items():
+            if not math.isfinite(number):
+                raise InputError(f"{name} is {number}, not a finite number")
+    for name, tensor in model.named_parameters():
+        tensor = tensor.detach()
+        wrong = torch.nonzero(~torch.isfinite(tensor))
+        if len(wrong):
+            place = wrong[0].tolist()
+            value = float(tensor[tuple(place)])
+            raise InputError(f"{name}{place or ''} is {value}, not a finite number")
+    with torch.no_grad():
+        kernel, _ = model.at(model.observed_size(card.voxel_size)).observer()
+    if not torch.isfinite(kernel).all():
+        raise InputError("the kernel that follows from the numbers of the model is not finite")
 
 
 def _check_head(data: Mapping[str, Any]) -> None:
@@ -196,8 +261,14 @@ def _check_head(data: Mapping[str, Any]) -> None:
 
 
 def _size(data: Mapping[str, Any]) -> KernelSize:
-    kz, ky, kx = (int(k) for k in data["kernel_size"])
-    return kz, ky, kx
+    given = data["kernel_size"]
+    try:
+        return TypeAdapter(KernelSize).validate_python(given)
+    except ValidationError:
+        raise InputError(
+            f"not a readable model file (kernel_size is {given!r}, not three whole numbers from 1 "
+            f"to {LARGEST_KERNEL})"
+        ) from None
 
 
 def _card(data: Mapping[str, Any]) -> ModelCard:

@@ -6,21 +6,35 @@ torch.
 
 from __future__ import annotations
 
+import difflib
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
+    AfterValidator,
     Field,
     SerializerFunctionWrapHandler,
     model_serializer,
     model_validator,
 )
 
+import scenenet
 from scenenet.core.settings import Settings
 from scenenet.dataset.voxels import Measurement
 
+LARGEST_KERNEL = 64
+"""Largest edge of a kernel, voxels: that of a tile, beyond which a survey cannot be predicted."""
+
 Positive = Annotated[int, Field(ge=1)]
-KernelSize = tuple[Positive, Positive, Positive]
+Edge = Annotated[int, Field(ge=1, le=LARGEST_KERNEL)]
+KernelSize = tuple[Edge, Edge, Edge]
+
+LARGEST_LENGTH = 20.0
+"""Largest length of a SCENE-Net in metres, m. It observes voxels of at least 2/3 m (the blocks of
+``scenenet.convolution.coarsening``), so that its kernels stay within ``LARGEST_KERNEL``."""
+
 BOOSTED_TREES = "boosted trees"
 """Name in tables of the model of ``scenenet.baselines.boosted_trees``."""
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
@@ -31,22 +45,43 @@ GENEO_INITS: tuple[Init, ...] = ("unranged", "handcrafted")
 """Initialisations that only a SCENE-Net has, because a CNN has no parameter ranges."""
 
 
+def _known_kernel(name: str) -> str:
+    """Refuse the name of a GENEO kernel that there is none of.
+
+    A kernel has the name of its file. The files are listed and not imported, because that would
+    load torch; kernels of other packages are known once the registry is loaded.
+    """
+    files = Path(scenenet.__path__[0], "geneo", "kernels").glob("[!_]*.py")
+    known = {file.stem for file in files}
+    if registry := sys.modules.get("scenenet.geneo.registry"):
+        known |= set(registry.kernel_names())
+    if name not in known:
+        close = difflib.get_close_matches(name, sorted(known), n=1)
+        hint = f"; did you mean {close[0]!r}?" if close else ""
+        raise ValueError(f"{name!r} is none of the kernels {', '.join(sorted(known))}{hint}")
+    return name
+
+
+Kernel = Annotated[str, AfterValidator(_known_kernel)]
+Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH)]
+
+
 class MetricSettings(Settings):
     """The fixed lengths and rules of a SCENE-Net in metres. docs/method/operational_protocol.md
     gives the reasons."""
 
-    radius: float = Field(3.0, gt=0, description="m, horizontal reach of the kernels")
-    above: float = Field(6.0, ge=0, description="m, upward reach of the kernels")
-    below: float = Field(6.0, ge=0, description="m, downward reach of the kernels")
-    section_radius: float = Field(
+    radius: float = Field(
+        3.0, gt=0, le=LARGEST_LENGTH, description="m, horizontal reach of the kernels"
+    )
+    above: Length = Field(6.0, description="m, upward reach of the kernels")
+    below: Length = Field(6.0, description="m, downward reach of the kernels")
+    section_radius: Length = Field(
         2.1,
-        ge=0,
         description="m, radius of the cross-section from which a voxel takes the strongest "
         "response; half the mean width of a tower (thesis 5.1.2)",
     )
-    section_above: float = Field(
+    section_above: Length = Field(
         2.0,
-        ge=0,
         description="m, height of the cross-section above the voxel; only upwards, because the "
         "foot of a tower is surrounded by ground",
     )
@@ -109,7 +144,7 @@ class TrainingSettings(Settings):
     epochs: int = Field(50, ge=1, description="passes over the training set")
     batch_size: int = Field(8, ge=1, description="crops per step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
-    learning_rate: float = Field(0.001, gt=0, description="step size of the optimiser")
+    learning_rate: float = Field(0.001, gt=0, le=1e30, description="step size of the optimiser")
     decay: float = Field(
         0.0, ge=0, lt=1, description="share by which the learning rate decreases (5.3.4)"
     )
@@ -129,7 +164,7 @@ class TrainingSettings(Settings):
 
 
 UNUSED: Mapping[str, tuple[str, ...]] = {
-    "cnn": ("metric", "search", "geneos"),
+    "cnn": ("protocol", "metric", "search", "geneos"),
     "thesis": ("metric", "search", "n_kernels"),
     "operational": ("training", "kernel_size", "n_kernels"),
 }
@@ -154,7 +189,7 @@ class ModelSettings(Settings):
     )
     metric: MetricSettings = MetricSettings()
     search: SearchSettings = SearchSettings()
-    geneos: tuple[str, ...] = Field(
+    geneos: tuple[Kernel, ...] = Field(
         THESIS_GENEOS, min_length=1, description="kernels of a SCENE-Net; a name may be repeated"
     )
     n_kernels: int = Field(3, ge=1, description="kernels of a CNN")
@@ -179,7 +214,12 @@ class ModelSettings(Settings):
                 if raw.get("kind") == "cnn"
                 else (f"a SCENE-Net of protocol {raw.get('protocol', 'thesis')}")
             )
-            raise ValueError(f"{', '.join(without_effect)}: without effect for {what}; remove it")
+            hint = ""
+            if "protocol" in without_effect:
+                hint = " (training.init: informed lets a cnn start from the training crops)"
+            raise ValueError(
+                f"{', '.join(without_effect)}: without effect for {what}; remove it{hint}"
+            )
         return raw
 
     @model_serializer(mode="wrap")

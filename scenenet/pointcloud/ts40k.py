@@ -12,6 +12,7 @@ Neither is loaded with pickle, so that a downloaded sample cannot run code.
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -101,9 +102,10 @@ def _from_pt(path: Path) -> tuple[np.ndarray, np.ndarray]:
         )
     points, labels = sample[POINTS_KEY], sample[LABELS_KEY]
     for key, value in ((POINTS_KEY, points), (LABELS_KEY, labels)):
-        if not isinstance(value, torch.Tensor) or value.is_complex():
+        plain = isinstance(value, torch.Tensor) and value.layout == torch.strided
+        if not plain or value.device.type != "cpu" or value.is_complex():
             raise InputError(
-                f"{key} is a {type(value).__name__}, not a tensor of numbers",
+                f"{key} is a {type(value).__name__}, not a plain tensor of numbers",
                 file=path,
                 remedy=FIX_PT,
             )
@@ -113,6 +115,15 @@ def _from_pt(path: Path) -> tuple[np.ndarray, np.ndarray]:
             file=path,
             remedy=FIX_PT,
         )
+    # A tensor can repeat one number without storing it, so a file of kilobytes can claim gigabytes.
+    for key, value in ((POINTS_KEY, points), (LABELS_KEY, labels)):
+        stored = value.untyped_storage().nbytes() // value.element_size()
+        if value.numel() > stored:
+            raise InputError(
+                f"{key} has {value.numel()} numbers, of which the file stores {stored}",
+                file=path,
+                remedy="Save a copy of the tensor: tensor.contiguous()",
+            )
     n = len(points)
     if tuple(labels.shape) not in {(n,), (n, 1), (1, n)}:
         raise InputError(
@@ -135,9 +146,8 @@ def _load_torch(path: Path) -> Any:
             return torch.load(path, map_location="cpu", weights_only=True)
     except pickle.UnpicklingError as error:
         raise InputError(
-            "the file has Python objects other than tensors and numbers, which are not loaded "
-            "because "
-            f"they can run code ({_first_line(error)})",
+            "the file is damaged or has Python objects other than tensors and numbers"
+            f"{_refused_object(error)}. Such objects are not loaded because they can run code",
             file=path,
             remedy=FIX_PT,
         ) from error
@@ -155,6 +165,15 @@ def _numpy_numbers() -> list[Any]:
     kinds = {type(np.dtype(code)) for code in "fdbhilqBHILQ?"}
     names = ["numpy.core.multiarray.scalar", "numpy._core.multiarray.scalar"]  # numpy 1 and 2
     return [*((scalar, name) for name in names), np.dtype, *kinds]
+
+
+def _refused_object(error: Exception) -> str:
+    """The object that torch names in its refusal, in brackets.
+
+    The rest of its message is left out: it tells how to switch the protection off.
+    """
+    named = re.search(r"GLOBAL ([\w.]+)", str(error))
+    return f" ({named.group(1)})" if named else ""
 
 
 def _first_line(error: Exception) -> str:

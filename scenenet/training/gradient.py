@@ -30,7 +30,7 @@ History = list[dict[str, float]]
 
 
 class LostTraining(InputError):
-    """The loss is no longer a finite number."""
+    """The loss or a parameter is no longer a finite number."""
 
 
 def fit_by_gradient(
@@ -43,7 +43,7 @@ def fit_by_gradient(
     """Train a new model by gradient; arguments and result as for ``scenenet.training.train.fit``.
 
     Raises:
-        LostTraining: the loss is no longer a finite number.
+        LostTraining: the loss or a parameter is no longer a finite number.
     """
     protocol = settings.training
     model = starting_model(settings, seed, training)
@@ -60,10 +60,10 @@ def fit_by_gradient(
             group["lr"] = protocol.rate(epoch)
         row = _epoch(model, optimiser, training, settings, weights, [seed, epoch])
         row["seconds"] = time.perf_counter() - started
-        if not np.isfinite(row["loss"]):
+        if not np.isfinite(row["loss"]) or not all(p.isfinite().all() for p in model.parameters()):
             raise LostTraining(
-                f"the training of {settings.name} from seed {seed} diverged: the loss of epoch "
-                f"{epoch} is {row['loss']}",
+                f"the training of {settings.name} from seed {seed} diverged: after epoch {epoch} "
+                f"a parameter or the loss ({row['loss']}) is not finite",
                 remedy="Set a lower training.learning_rate",
             )
         row |= _validate(model, validation, settings, weights)

@@ -43,6 +43,8 @@ def preset(
         epochs=epochs or EPOCHS,
         learning_rate=learning_rate or LEARNING_RATES[protocol],
     )
+    if kind == "cnn":  # the protocol of a CNN is its training
+        return ModelSettings(name=kind, kind=kind, training=training)
     return ModelSettings(name=kind, kind=kind, protocol=protocol, training=training)
 
 

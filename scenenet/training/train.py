@@ -74,7 +74,6 @@ def card_of(
             "seed": seed,
             "data": digest(sorted(training.content)),
             "training_crops": len(training.samples),
-            "protocol": model.protocol,
             **_how_trained(model),
             **provenance,
         },
@@ -83,7 +82,8 @@ def card_of(
 
 def _how_trained(model: ModelSettings) -> dict[str, Any]:
     settings = model.model_dump(mode="json")
-    found: dict[str, Any] = {k: settings[k] for k in ("training", "search") if k in settings}
+    keys = [key for key in ("protocol", "training", "search") if key in settings]
+    found: dict[str, Any] = {key: settings[key] for key in keys}
     if "kernel_size" in settings:
         found["trained_kernel_size"] = settings["kernel_size"]
     return found

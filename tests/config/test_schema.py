@@ -162,6 +162,7 @@ def test_reading_a_configuration_loads_nothing_heavy():
     ("model", "names"),
     [
         ({"kind": "cnn", "geneos": ["arrow"]}, "geneos"),
+        ({"kind": "cnn", "protocol": "operational"}, "protocol"),
         ({"kind": "scenenet", "n_kernels": 3, "search": {}}, "search, n_kernels"),
         (
             {"kind": "scenenet", "protocol": "operational", "kernel_size": [9, 9, 9]},
@@ -177,12 +178,95 @@ def test_a_setting_without_effect_is_refused(model, names):
     assert f"{names}: without effect for" in complaint(models=[{"name": "m", **model}])
 
 
+def test_a_cnn_of_protocol_operational_is_refused_with_what_to_write_instead():
+    message = complaint(models=[{"name": "m", "kind": "cnn", "protocol": "operational"}])
+    assert "models[0]: protocol: without effect for a cnn; remove it" in message
+    assert "training.init: informed" in message
+
+
+def test_an_unknown_kernel_is_refused_with_the_nearest_name():
+    model = {"name": "m", "kind": "scenenet", "geneos": ["arrow", "cylindre"]}
+    message = complaint(models=[model])
+    assert "models[0].geneos[1]: 'cylindre' is none of the kernels arrow, cylinder" in message
+    assert "did you mean 'cylinder'?" in message
+
+
+def test_the_kernels_of_the_settings_are_those_of_the_registry():
+    """The settings list the files, and the registry imports them."""
+    code = (
+        "from scenenet.models.settings import ModelSettings\n"
+        "from pydantic import ValidationError\n"
+        "try:\n"
+        "    ModelSettings(name='m', kind='scenenet', geneos=('none',))\n"
+        "except ValidationError as error:\n"
+        "    print(error.errors()[0]['msg'])\n"
+        "from scenenet.geneo import kernel_names\n"
+        "print(', '.join(kernel_names()))\n"
+    )
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    message, names = shown.stdout.splitlines()
+    assert message == f"Value error, 'none' is none of the kernels {names}"
+
+
+@pytest.mark.parametrize("edge", [0, 65])
+def test_a_kernel_has_from_1_to_64_voxels_along_an_edge(edge):
+    message = complaint(models=[{"name": "m", "kind": "cnn", "kernel_size": [9, edge, 9]}])
+    assert f"models[0].kernel_size[1]: {edge} is not allowed" in message
+
+
+@pytest.mark.parametrize(("key", "value"), [("radius", 20.5), ("above", 1e9), ("below", -1.0)])
+def test_a_length_of_a_model_in_metres_has_bounds(key, value):
+    metric = {"kind": "scenenet", "protocol": "operational", "metric": {key: value}}
+    message = complaint(models=[{"name": "m", **metric}])
+    assert f"models[0].metric.{key}: {value!r} is not allowed" in message
+
+
+@pytest.mark.parametrize("value", [0.0, 0.001, 1e300])
+def test_a_voxel_has_bounds(value):
+    message = complaint(voxels={"fit": "metric", "voxel_size": value})
+    assert f"voxels.voxel_size: {value!r} is not allowed" in message
+
+
+@pytest.mark.parametrize(
+    ("path", "fault"),
+    [
+        ("res{survey}", "has a brace, which Snakemake reads as a wildcard"),
+        ("res\x00", "has the control character '\\x00'"),
+        ("a\nb", "has the control character '\\n'"),
+        ("a/" + "x" * 256, "has a name of 256 bytes, more than the 255 of a file name"),
+        ("ä" * 128, "has a name of 256 bytes, more than the 255 of a file name"),
+        ("x/" * 2048, "has 4096 bytes, more than the 4095 of a path"),
+    ],
+    ids=["brace", "NUL", "line break", "long name", "long name of bytes", "long path"],
+)
+@pytest.mark.parametrize("key", ["results_dir", "surveys", "ts40k_dir", "thesis", "folder"])
+def test_a_path_that_cannot_be_used_is_refused(key, path, fault):
+    setting = {"new_surveys": {"folder": path}} if key == "folder" else {key: path}
+    shown = f"new_surveys.{key}" if key == "folder" else key
+    assert f"  {shown}: the path {fault}" in complaint(**setting)
+
+
+def test_the_longest_paths_are_allowed():
+    for path in ("x" * 255, "ä" * 127, ("x" * 100 + "/") * 40, "Prüfung 3 (alt)/*[a]"):
+        assert load(raw(results_dir=path)).results_dir == path
+
+
+@pytest.mark.parametrize("text", ["cost in $", "$x_$", "a\x00b"])
+def test_a_text_that_a_figure_cannot_draw_is_refused(text):
+    study = {"name": "s", "title": "t", "place": "p", "asks": "?"}
+    variants = [{"name": "v"}]
+    message = complaint(studies=[{**study, "title": text, "variants": variants}])
+    assert "studies[0].title: has " in message
+    message = complaint(studies=[{**study, "variants": [{"name": text}]}])
+    assert "studies[0].variants[0].name: has " in message
+
+
 def test_only_settings_with_an_effect_are_recorded():
     searched = {"name": "m", "kind": "scenenet", "protocol": "operational"}
     config = load(raw(models=[*MODELS, searched], training={"epochs": 7}))
     recorded = {model["name"]: set(model) for model in config.plain()["models"]}
     assert not recorded["m"] & {"training", "kernel_size", "n_kernels"}
-    assert not recorded["cnn"] & {"geneos", "metric", "search"}
+    assert not recorded["cnn"] & {"protocol", "geneos", "metric", "search"}
     assert not recorded["scenenet"] & {"n_kernels", "metric", "search"}
     assert config.plain()["models"][0]["training"]["epochs"] == 7
     assert load(config.plain()) == config

@@ -97,6 +97,29 @@ def test_a_wrong_row_is_named_by_its_line(root, row, expected):
     assert expected in message
 
 
+@pytest.mark.parametrize(
+    ("path", "expected"),
+    [
+        ("x\x00.laz", r"the path 'x\x00.laz' has the control character '\x00'"),
+        ("x" * 300 + ".laz", "xxx...' has a name of 304 bytes"),
+        ("x/" * 3000 + "a.laz", "x/...' has 6005 bytes"),
+        ("a{b}.laz", "the path 'a{b}.laz' has a brace, which Snakemake reads as a wildcard"),
+        ("loop.laz", "loop.laz cannot be read: it is part of a loop of links"),
+        ("loop.laz/a.laz", "loop.laz/a.laz cannot be read: it is part of a loop of links"),
+        ("dead.laz", "dead.laz cannot be read: it is a link to gone.laz, which does not exist"),
+    ],
+    ids=["NUL", "long name", "long path", "brace", "loop", "folder in a loop", "dead link"],
+)
+def test_a_path_that_cannot_be_followed_is_named_by_its_line(root, path, expected):
+    (root / "loop.laz").symlink_to("other.laz")
+    (root / "other.laz").symlink_to("loop.laz")
+    (root / "dead.laz").symlink_to("gone.laz")
+    message = complaint(root, "", f"north\t{path}\tedp\ttrain")
+    assert message.startswith("surveys.tsv: one problem in the survey sheet\n  line 3: ")
+    assert expected in message
+    assert len(message) < 300
+
+
 def test_all_problems_are_reported_together(root):
     message = complaint(
         root,
@@ -192,11 +215,17 @@ def test_a_name_that_snakemake_cannot_use_is_left_out(root, capsys, name, reason
     assert reason in error
 
 
-def test_a_dead_link_in_the_inbox_is_left_out(root, capsys):
-    (root / "inbox" / "gone.laz").symlink_to("disk/gone.laz")
+@pytest.mark.parametrize(
+    ("target", "reason"),
+    [
+        ("disk/gone.laz", "it is a link to disk/gone.laz, which does not exist. Mend or remove it"),
+        ("gone.laz", "it is part of a loop of links. Mend or remove it"),
+    ],
+)
+def test_a_link_in_the_inbox_that_leads_nowhere_is_left_out(root, capsys, target, reason):
+    (root / "inbox" / "gone.laz").symlink_to(target)
     assert [s.name for s in read(root, new_surveys={"folder": "inbox"})] == ["new_one"]
-    message = "left out: inbox/gone.laz: it is a link to disk/gone.laz, which does not exist"
-    assert message in capsys.readouterr().err
+    assert f"left out: inbox/gone.laz: {reason}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("row", ["ab" * 20 + "\tdata/north.laz", "mine\tdata/a{b}.laz"])

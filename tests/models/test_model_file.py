@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 import torch
+from safetensors import safe_open
 
 from scenenet.core.errors import InputError
 from scenenet.models.cnn import CNN
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard, read_model, suffix, write_model
 from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import LARGEST_KERNEL, MetricSettings
+from scenenet.prediction.tiling import EDGE
 
 CARD = ModelCard(
     name="m",
@@ -83,6 +90,9 @@ def test_a_number_edited_by_hand_is_read(written):
     assert read_model(path)[0].shape_parameters()["cylinder.r"] == 1.25
 
 
+NAN, INF = float("nan"), float("inf")
+
+
 def _drop(*keys):
     def change(data):
         for key in keys[:-1]:
@@ -110,7 +120,19 @@ def _put(value, *keys):
         (_drop("voxel_size"), "not a readable model file"),
         (_put(-1.0, "voxel_size"), "not a readable model file"),
         (_put(1.5, "tau"), "not a readable model file"),
-        (_put([9, 9], "kernel_size"), "not a readable model file"),
+        (
+            _put([9, 9], "kernel_size"),
+            "not a readable model file .kernel_size is .9, 9., not three",
+        ),
+        (_put([65, 9, 9], "kernel_size"), "kernel_size is .65, 9, 9., not three .* from 1 to 64"),
+        (_put([0, 9, 9], "kernel_size"), "kernel_size is .0, 9, 9., not three"),
+        (_put([9.7, 9, 9], "kernel_size"), "kernel_size is .9.7, 9, 9., not three"),
+        (_put(1e300, "voxel_size"), "not a readable model file .voxel_size = 1e.300: "),
+        (_put(1e-300, "voxel_size"), "not a readable model file .voxel_size = 1e-300: "),
+        (_put(NAN, "voxel_size"), "not a readable model file .voxel_size = nan: "),
+        (_put(NAN, "mixing_weights", "arrow"), "lambda.arrow is nan, not a finite number"),
+        (_put(INF, "geneos", 0, "parameters", "r", "value"), "cylinder.r is inf, not a finite"),
+        (_put(1e39, "geneos", 1, "parameters", "beta", "value"), "arrow.beta is 1e.39, not a fin"),
         (_put([], "geneos"), "at least one GENEO"),
         (_put(["cylinder"], "geneos"), "not a readable model file"),
         (_put("disk", "geneos", 0, "kernel"), "unknown GENEO kernel 'disk'"),
@@ -154,6 +176,109 @@ def test_weights_without_a_card_are_refused(tmp_path):
     save_file({"bias": torch.zeros(3)}, tmp_path / "m.safetensors")
     with pytest.raises(InputError, match="not a readable model file"):
         read_model(tmp_path / "m.safetensors")
+
+
+def _write_weights(path: Path, tensors: dict[str, torch.Tensor], **head) -> None:
+    """A CNN file with any weights and any head."""
+    from safetensors.torch import save_file
+
+    write_model(path, CNN(), CARD)
+    with safe_open(path, framework="pt") as stream:
+        known = json.loads(stream.metadata()["model"])
+    save_file(tensors, path, metadata={"model": json.dumps(known | head)})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("weight", NAN, r"weight\[1, 2, 3, 4\] is nan, not a finite number"),
+        ("weight", -INF, r"weight\[1, 2, 3, 4\] is -inf, not a finite number"),
+        ("bias", INF, r"bias\[2\] is inf, not a finite number"),
+    ],
+)
+def test_weights_that_are_not_finite_are_neither_read_nor_written(tmp_path, name, value, message):
+    model = CNN()
+    place = (1, 2, 3, 4) if name == "weight" else (2,)
+    model.state_dict()[name][place] = value
+    path = tmp_path / "m.safetensors"
+    with pytest.raises(InputError, match=message) as refused:
+        write_model(path, model, CARD)
+    assert refused.value.file == str(path)
+    assert not path.exists()
+    _write_weights(path, model.state_dict())
+    with pytest.raises(InputError, match=message) as refused:
+        read_model(path)
+    assert refused.value.file == str(path)
+
+
+@pytest.mark.parametrize("kind", [SceneNet, MetricSceneNet])
+@pytest.mark.parametrize("name", ["lambda.arrow", "negative_sphere.omega"])
+def test_numbers_that_are_not_finite_are_not_written(tmp_path, kind, name):
+    model = kind()
+    group, symbol = name.split(".")
+    stored = model.mixing if group == "lambda" else model.shapes[group]
+    stored[symbol].data.fill_(NAN)
+    # A softmax of one NaN is NaN everywhere, so the first weight may be named instead.
+    named = r"lambda\.\w+" if group == "lambda" else name
+    with pytest.raises(InputError, match=f"{named} is nan, not a finite number"):
+        write_model(tmp_path / "m.json", model, CARD)
+    assert not (tmp_path / "m.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("tensors", "head", "message"),
+    [
+        (CNN().state_dict(), {"kernel_size": [500, 500, 800]}, "kernel_size is .500, 500, 800."),
+        (CNN().state_dict(), {"kernel_size": [64, 64, 64]}, "weights of the shapes"),
+        ({"weight": torch.zeros(1, 9, 9, 9)}, {}, "weights of the shapes"),
+        ({"weight": torch.zeros(0, 9, 9, 9), "bias": torch.zeros(0)}, {}, "weights of the shapes"),
+        (
+            {"weight": torch.zeros(1, 9, 9, 9, dtype=torch.int32), "bias": torch.zeros(1)},
+            {},
+            "weight has the type torch.int32",
+        ),
+    ],
+    ids=["claimed size", "largest size", "no bias", "no kernel", "whole numbers"],
+)
+def test_weights_that_do_not_fit_the_head_are_refused(tmp_path, tensors, head, message):
+    _write_weights(tmp_path / "m.safetensors", tensors, **head)
+    with pytest.raises(InputError, match=message) as refused:
+        read_model(tmp_path / "m.safetensors")
+    assert refused.value.file == str(tmp_path / "m.safetensors")
+
+
+def test_a_claimed_kernel_takes_no_memory(tmp_path):
+    """64^3 is allowed, and 4000 kernels of it take 4.2 GB; the file has 9 kB."""
+    path = tmp_path / "m.safetensors"
+    tensors = {"weight": torch.zeros(1, 9, 9, 9), "bias": torch.zeros(4000)}
+    _write_weights(path, tensors, kernel_size=[64, 64, 64])
+    code = (
+        "import resource, sys\n"
+        "from scenenet.core.errors import InputError\n"
+        "from scenenet.models.model_file import read_model\n"
+        "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
+        "try:\n"
+        "    read_model(sys.argv[1])\n"
+        "except InputError:\n"
+        "    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True
+    )
+    assert int(done.stdout) < 100_000  # KiB
+
+
+def test_lengths_and_voxels_stay_within_what_a_tile_holds():
+    """A SCENE-Net in metres observes voxels of at least 2/3 m."""
+    longest = MetricSettings(
+        radius=20.0, above=20.0, below=20.0, section_radius=20.0, section_above=20.0
+    )
+    model = MetricSceneNet(metric=longest)
+    sizes = [model.observed_size(0.01 * n) for n in range(1, 400)]
+    assert min(sizes) >= 2 / 3
+    observed = [model.at(size) for size in sizes]
+    assert max(max(m.kernel_size) for m in observed) <= LARGEST_KERNEL
+    assert max(max(m.reach) for m in observed) <= EDGE
 
 
 def test_a_missing_model_file_is_refused(tmp_path):

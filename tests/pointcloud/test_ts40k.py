@@ -157,6 +157,43 @@ def test_a_dictionary_of_another_shape_is_refused(tmp_path, content, words):
         read(save_pt(tmp_path, content))
 
 
+def test_the_refusal_of_an_object_names_it_and_gives_no_advice_to_load_it(tmp_path):
+    sample = {"input_pcd": Trap(), "semantic_labels": torch.zeros(1)}
+    path = save_pt(tmp_path, sample)
+    with pytest.raises(InputError) as refused:
+        read(path, codes="edp")
+    message = str(refused.value)
+    assert "objects other than tensors and numbers (print)" in message.replace("builtins.", "")
+    assert "not loaded because they can run code. Save a dictionary with input_pcd" in message
+    for advice in ("weights_only", "trust", "add_safe_globals", "two options"):
+        assert advice not in message
+
+
+@pytest.mark.parametrize("key", ["input_pcd", "semantic_labels"])
+def test_a_tensor_that_repeats_one_number_is_refused_before_it_takes_memory(tmp_path, key):
+    """2 kB that would be 24 TB."""
+    sample = {"input_pcd": torch.zeros(10, 3), "semantic_labels": torch.zeros(10)}
+    shape = (10**12, 3) if key == "input_pcd" else (10**12,)
+    path = save_pt(tmp_path, sample | {key: torch.zeros(1).expand(shape)})
+    assert path.stat().st_size < 3000
+    with pytest.raises(InputError, match=rf"{key} has \d+ numbers, of which the file stores 1\."):
+        read(path, codes="edp")
+
+
+def test_a_part_of_a_larger_tensor_is_read(tmp_path):
+    table = torch.arange(40, dtype=torch.float64).reshape(10, 4)
+    path = save_pt(tmp_path, {"input_pcd": table[:, :3], "semantic_labels": table[:, 3] * 0 + 2})
+    np.testing.assert_array_equal(read(path, codes="edp").xyz, table[:, :3].numpy())
+
+
+@pytest.mark.parametrize("kind", ["sparse", "meta"])
+def test_a_tensor_without_its_numbers_is_refused(tmp_path, kind):
+    points = torch.ones(2, 3).to_sparse() if kind == "sparse" else torch.ones(2, 3, device="meta")
+    path = save_pt(tmp_path, {"input_pcd": points, "semantic_labels": torch.zeros(2)})
+    with pytest.raises(InputError, match="not a plain tensor of numbers"):
+        read(path, codes="edp")
+
+
 def test_a_damaged_dictionary_is_refused(tmp_path):
     path = save_pt(tmp_path, sample(torch.tensor([4, 5])))
     path.write_bytes(path.read_bytes()[:300])

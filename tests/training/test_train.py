@@ -14,6 +14,7 @@ from scenenet.models.model_file import read_model
 from scenenet.models.predictions import probabilities, threshold_curve
 from scenenet.models.settings import LossSettings, ModelSettings, TrainingSettings
 from scenenet.training import gradient
+from scenenet.training.gradient import LostTraining
 from scenenet.training.losses import VoxelWeights, fidelity
 from scenenet.training.train import fit, train
 
@@ -169,6 +170,13 @@ def test_a_checkpoint_of_something_else_is_ignored(toys, cut_after, tmp_path, wh
     model, history = fit(toys[:3], [], chosen, 1, checkpoint=checkpoint)
     assert len(history) == 3
     assert numbers(model) == numbers(fresh)
+
+
+def test_a_training_that_diverges_is_refused(toys):
+    """The loss of the first epoch is that of the start, and the step after it overflows."""
+    chosen = settings(epochs=1, optimiser="sgd", learning_rate=1e38, batch_size=3)
+    with pytest.raises(LostTraining, match=r"m from seed 1 diverged: after epoch 1 .*lower"):
+        fit(toys[:3], [], chosen, 1)
 
 
 def test_history_has_a_row_per_epoch_and_a_column_per_parameter(toys):

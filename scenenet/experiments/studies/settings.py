@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, ValidationError, model_validator
 
-from scenenet.core.settings import Settings, changed
+from scenenet.core.settings import FigureText, Settings, changed
 from scenenet.dataset.split import SplitSettings
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.models.settings import KernelSize, ModelSettings
@@ -17,7 +17,7 @@ from scenenet.models.settings import KernelSize, ModelSettings
 class Variant(Settings):
     """One way to train, given by the settings that it changes."""
 
-    name: str = Field(min_length=1, description="name in tables and figures")
+    name: FigureText = Field(min_length=1, description="name in tables and figures")
     changes: dict[str, Any] = Field(
         default_factory=dict,
         description="dotted settings and their values: of the model (training.loss.alpha), of the "
@@ -33,7 +33,7 @@ class StudySettings(Settings):
     """A question, and the trainings that answer it."""
 
     name: str = Field(pattern=r"^[a-z][a-z0-9-]*$", description="name in files and in MLflow")
-    title: str = Field(description="heading in the report")
+    title: FigureText = Field(description="heading in the report and title of the figure")
     place: str = Field(description="section or table of the thesis with the same question")
     asks: str = Field(description="the question, as one sentence")
     thesis_says: str | None = Field(None, description="the finding of the thesis, as one sentence")

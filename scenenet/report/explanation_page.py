@@ -17,6 +17,7 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.figures import Picture
 from scenenet.figures.plots.point_clouds import View, side_views
 from scenenet.interpretability.explanations import TowerExplanation, explanations, meanings
+from scenenet.models.model_file import ModelCard
 from scenenet.pointcloud import iter_chunks
 from scenenet.prediction.predict import SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
@@ -75,8 +76,26 @@ def explain_survey(
             picture = scratch / f"{explanation.id}.png"
             sections.append(_section(explanation, xyz, views, picture))
         title = f"Why these are towers: {Path(survey).name}"
-        write_text(out, render(sections, title, f"model {card.name}, {card.provenance}", GENERATOR))
+        write_text(out, render(sections, title, GENERATOR, made_by=_origin(card)))
     return explained
+
+
+def _origin(card: ModelCard) -> str:
+    """What made the model, as a sentence; what its file does not say is left out."""
+    made_by = card.provenance
+    known = [
+        text.format(made_by[key])
+        for key, text in {
+            "protocol": "protocol {}",
+            "seed": "seed {}",
+            "training_crops": "{} training crops",
+            "data": "data {}",
+            "config": "configuration {}",
+            "version": "scenenet {}",
+        }.items()
+        if made_by.get(key) is not None
+    ]
+    return f"Model {card.name}" + (f": {', '.join(known)}." if known else ".")
 
 
 def _parameters(rows: list[tuple[str, float, str, str]]) -> list[Block]:

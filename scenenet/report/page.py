@@ -68,12 +68,24 @@ def write_report(
     """
     context = ReportContext(results, thesis)
     made = [section for make in SECTIONS if (section := make(context)) is not None]
-    write_text(out, render(made, title, thesis.source, "scenenet report"))
+    write_text(out, render(made, title, "scenenet report", thesis.source))
     return made
 
 
-def render(made: Sequence[Section], title: str, source: str, generator: str) -> str:
-    """Sections as an HTML page; ``generator`` says in its head what wrote it."""
+def render(
+    made: Sequence[Section],
+    title: str,
+    generator: str,
+    source: str | None = None,
+    made_by: str | None = None,
+) -> str:
+    """Sections as an HTML page.
+
+    Args:
+        generator: says in the head of the page what wrote it.
+        source: of the published numbers on the page, for the footer; None if it has none.
+        made_by: what made the page, as a sentence for the footer.
+    """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -89,7 +101,13 @@ def render(made: Sequence[Section], title: str, source: str, generator: str) -> 
     script = Markup((ASSETS / "page.js").read_text(encoding="utf-8"))
     page = environment.get_template("page.html")
     return page.render(
-        title=title, sections=made, style=style, script=script, source=source, generator=generator
+        title=title,
+        sections=made,
+        style=style,
+        script=script,
+        generator=generator,
+        source=source,
+        made_by=made_by,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import sys
 from typing import TYPE_CHECKING, NamedTuple
 
 from pydantic import ValidationError
@@ -66,9 +67,19 @@ def initial_model(result: SeedResult, trained: VoxelModel) -> InitialModel | Non
 
 
 def _settings(result: SeedResult) -> ModelSettings | None:
-    """The settings of a training; None if its record has none."""
-    recorded = (result.provenance or {}).get("settings", {})
+    """The settings of a training; None if its record has none, or settings that this version
+    refuses, which are reported on stderr."""
+    recorded = (result.provenance or {}).get("settings")
+    if not recorded:
+        return None
     try:
-        return ModelSettings(**recorded)
-    except (ValidationError, TypeError):
+        return ModelSettings.model_validate(recorded)
+    except ValidationError as error:
+        fault = error.errors()[0]
+        place = ".".join(map(str, fault["loc"])) or "settings"
+        print(
+            f"{result.model} seed {result.seed}: the recorded settings are not those of this "
+            f"version, so its initial parameters cannot be drawn again ({place}: {fault['msg']})",
+            file=sys.stderr,
+        )
         return None

@@ -159,6 +159,11 @@ def test_explain_writes_a_page_that_needs_no_other_file(survey, model, tmp_path)
     assert "reach of the tower" in text
     assert not re.search(r"""(src|href|url)\s*[=(]\s*["']?(https?:)?//""", text)
     assert text.count("data:image/png") == len(json.loads(done.stdout))
+    footer = text[text.index("<footer>") : text.index("</footer>")]
+    card = json.loads(model.read_text())
+    made_by = f"Model {card['name']}: protocol operational, seed {card['provenance']['seed']}, 4 "
+    assert made_by in footer
+    assert "{" not in footer and "thesis (" not in footer
 
 
 def test_a_missing_survey_ends_with_code_1_and_its_name(model, tmp_path):

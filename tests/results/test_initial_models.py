@@ -67,6 +67,21 @@ def test_an_initial_model_that_depends_on_data_is_not_drawn_again():
     assert initial_model(result(cnn), new_model(cnn, 3)) is None
 
 
-def test_without_a_record_and_a_history_the_initial_model_is_unknown():
+def test_settings_that_this_version_refuses_are_reported(capsys):
+    """Version 0.1 recorded settings without effect as well, and called the start ``field``."""
+    model = MetricSceneNet(metric=MetricSettings())
+    for settings, fault in (
+        ({"name": "m", "kind": "cnn", "geneos": ["arrow"]}, "settings: "),
+        ({"name": "m", "kind": "scenenet", "training": {"init": "field"}}, "training: "),
+    ):
+        record = SeedResult("m", "scenenet", 3, {}, provenance={"settings": settings})
+        assert initial_model(record, model) is None
+        message = capsys.readouterr().err
+        assert message.startswith("m seed 3: the recorded settings are not those of this version")
+        assert fault in message
+
+
+def test_without_a_record_and_a_history_the_initial_model_is_unknown(capsys):
     model = MetricSceneNet(metric=MetricSettings())
     assert initial_model(SeedResult("m", "scenenet", 3, {}), model) is None
+    assert capsys.readouterr().err == ""

@@ -233,8 +233,8 @@ def _require_finite(model: VoxelModel, card: ModelCard) -> None:
         for name, number in model.shape_parameters().items():
             if not math.isfinite(number):
                 raise InputError(f"{name} is {number}, not a finite number")
-    for name, tensor in model.named_parameters():
-        tensor = tensor.detach()
+    for name, parameter in model.named_parameters():
+        tensor = parameter.detach()
         wrong = torch.nonzero(~torch.isfinite(tensor))
         if len(wrong):
             place = wrong[0].tolist()

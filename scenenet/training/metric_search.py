@@ -115,4 +115,5 @@ def _resume(
     saved = checkpoint.read()
     if saved is None:
         return None, []
-    return State(**saved.arrays, **saved.record["state"]), saved.record["history"]
+    fields: dict[str, Any] = {**saved.arrays, **saved.record["state"]}
+    return State(**fields), saved.record["history"]

@@ -22,6 +22,9 @@ from pathlib import Path
 import laspy
 import numpy as np
 
+from scenenet.pointcloud.append_dimensions import REWRITTEN
+from scenenet.pointcloud.las.header import read_header
+
 ADDED = ("tower_probability", "tower_id")
 HUNG_S = 120.0
 """A command that takes longer has hung."""
@@ -123,12 +126,12 @@ def differences(source: Path, target: Path) -> list[str]:
     for field in ("scales", "offsets"):
         if not np.array_equal(getattr(old.header, field), getattr(new.header, field)):
             lost.append(f"{field} of the header")
-    kept = {(v.user_id, v.record_id) for v in [*new.vlrs, *(new.evlrs or ())]}
-    octree_and_compression = ("copc", "laszip encoded")
-    for record in [*old.vlrs, *(old.evlrs or ())]:
-        if record.user_id in octree_and_compression or (record.user_id, record.record_id) in kept:
+    kept = {(r.user_id, r.record_id, r.data) for r in read_header(target).records}
+    for record in read_header(source).records:  # laspy takes the points for a record if one lacks
+        if (record.user_id, record.record_id) in REWRITTEN or record.user_id == "copc":
             continue
-        lost.append(f"record {record.user_id} {record.record_id}")
+        if (record.user_id, record.record_id, record.data) not in kept:
+            lost.append(f"record {record.user_id} {record.record_id}")
     return lost
 
 

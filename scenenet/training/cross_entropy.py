@@ -1,13 +1,13 @@
-"""Cross entropy in the place of the squared error (thesis 5.3.3), from the observer's answer H(x).
+"""Cross entropy instead of the squared error (thesis 5.3.3), from the observer's response H(x).
 
-With p = (tanh H)_+ it is -log(1 - p) where there is no tower and -log p where there is one.
+With p = (tanh H)_+, a voxel costs -log(1 - p) if it is no tower voxel and -log p if it is one.
 
-- **No tower**: -log(1 - tanh h) = softplus(2 h) - log 2, taken from h = (H)_+ and not from p, which
-  is 1 in float32 from h = 9 on. So a wrong answer costs more the surer it is, about 2 h, and its
-  slope 1 + p never vanishes. Where H is not positive p is 0, and the cost as well.
-- **Tower**: where ReLU answers exactly 0 the logarithm has no value. p counts as at least
-  ``LEAST`` there, which costs -log ``LEAST``; like ReLU itself that has no slope, so a start that
-  is dead for the squared error is dead here too.
+- **No tower**: -log(1 - tanh h) = softplus(2 h) - log 2, computed from h = (H)_+ and not from p,
+  which is 1 in float32 from h = 9 on. A wrong response costs about 2 h, and its slope 1 + p never
+  vanishes. Where H is not positive, p and the cost are 0.
+- **Tower**: where ReLU gives exactly 0, the logarithm is not defined. p counts as at least
+  ``LEAST`` there, which costs -log ``LEAST``. Like ReLU, this has no slope: a start that is dead
+  for the squared error is dead here too.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from scenenet.convolution.convolve import convolve
 from scenenet.convolution.occupancy import Occupancy
 
 LEAST = 1e-6
-"""The least probability that a tower voxel counts with. It bounds the slope -1 / p as well."""
+"""Smallest probability of a tower voxel in the loss. It also bounds the slope -1 / p."""
 
 
 def cross_entropy(
@@ -35,12 +35,12 @@ def cross_entropy(
 ) -> Tensor:
     """-sum over all voxels of f_w(y) (y log M(x) + (1 - y) log(1 - M(x))); differentiable.
 
-    It needs one volume for the answers of the batch; all else is of the voxels with a positive
-    answer alone, the others being answered 0 and without a slope.
+    It needs one volume for the responses of the batch. Everything else uses the voxels with a
+    positive response alone; all others have probability 0 and no slope.
 
     Args:
-        occupancy, kernel, bias, tower, weights: as ``scenenet.convolution.observer.squared_error``
-            takes them.
+        occupancy, kernel, bias, tower, weights: as for
+            ``scenenet.convolution.observer.squared_error``.
 
     Returns:
         () of the kernel's dtype.
@@ -49,14 +49,14 @@ def cross_entropy(
     if bias is not None:
         answers = answers + bias
     empty, at_tower = weights
-    # Not "> 0", which what is not a number would pass by unseen.
-    speaking = answers[~(answers <= 0)]
+    # Not "> 0", which would drop NaN.
+    positive = answers[~(answers <= 0)]
     there = torch.relu(answers[torch.from_numpy(tower)])
     probability = torch.tanh(there.double()).clamp(min=LEAST)
-    wrong = empty * (_no_tower(speaking).sum() - _no_tower(there).sum())
+    wrong = empty * (_no_tower(positive).sum() - _no_tower(there).sum())
     return (wrong - at_tower * probability.log().sum()).to(kernel.dtype)
 
 
 def _no_tower(h: Tensor) -> Tensor:
-    """-log(1 - tanh h) for h >= 0, in float64: about 0 the two terms are nearly the same."""
+    """-log(1 - tanh h) for h >= 0, in float64, because the two terms nearly cancel around 0."""
     return softplus(2 * h.double()) - math.log(2)

@@ -1,15 +1,14 @@
-"""Where a training by gradient begins (thesis 5.2.1, 5.3.4).
+"""Initialisation of training by gradient (thesis 5.2.1, 5.3.4).
 
-- ``thesis``: numbers are drawn once, a SCENE-Net's from the ranges that stand beside its kernels
-  and a CNN's as torch does (``scenenet.models.scenenet``).
+- ``thesis``: numbers are drawn once: those of a SCENE-Net from the ranges of its kernels, those of
+  a CNN as torch draws them.
 - ``unranged``: "not enforcing ranges" (5.3.4), every number of a SCENE-Net from N(0, 1).
 - ``handcrafted``: "handcrafted values" (5.3.4), the same for every seed.
-- ``informed``: the training crops choose it.
+- ``informed``: chosen by the training crops.
 
-A model is dead where its observer is negative at everything that matters: ReLU then answers zero,
-lets no gradient through, and training never moves (thesis 5.2.6: "only one in five trained CNNs
-returns non-zero predictions"). Both ways of
-``informed`` begin where towers are distinguished from the rest.
+A model is dead if its observer is negative at all voxels that matter: ReLU then gives zero and no
+gradient, and training never moves (thesis 5.2.6: "only one in five trained CNNs returns non-zero
+predictions"). An ``informed`` model starts with numbers that separate towers from the rest.
 """
 
 from __future__ import annotations
@@ -35,17 +34,17 @@ from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import KernelSize, ModelSettings
 
 MOST_VOXELS = 20_000
-"""Occupied voxels that a CNN's start is worked out from, beside those of towers."""
+"""Occupied voxels, besides those of towers, that the start of a CNN is computed from."""
 DRAWS = 64
-"""Sets of numbers that a SCENE-Net begins at the best of."""
+"""Draws of which the best is the start of a SCENE-Net."""
 NOISE = 0.1
-"""Part of the random weights that a CNN keeps, which tells its kernels and the seeds apart."""
+"""Share of the random weights that a CNN keeps, so that its kernels and the seeds differ."""
 
 
 def starting_model(
     settings: ModelSettings, seed: int, training: Sequence[VoxelSample]
 ) -> VoxelModel:
-    """A new model that begins as ``settings.training.init`` says."""
+    """A new model, initialised by ``settings.training.init``."""
     init = settings.training.init
     if init == "informed":
         return informed_model(settings, seed, training)
@@ -59,8 +58,8 @@ def starting_model(
 
 
 def handcrafted(model: GeneoModel) -> dict[str, float]:
-    """Numbers that were set by hand, by name: the kernels' own (``ShapeParameter.handcrafted``),
-    and every kernel with the same weight."""
+    """Numbers set by hand, by name: the shape parameters of the kernels
+    (``ShapeParameter.handcrafted``) and equal mixing weights."""
     shapes = {
         f"{name}.{parameter.name}": parameter.handcrafted
         for name, geneo in zip(model.names, model.geneos, strict=True)
@@ -72,11 +71,11 @@ def handcrafted(model: GeneoModel) -> dict[str, float]:
 def informed_model(
     settings: ModelSettings, seed: int, training: Sequence[VoxelSample]
 ) -> VoxelModel:
-    """A new model that begins where it tells the towers of ``training`` from the rest.
+    """A new model that separates the towers of ``training`` from the rest at the start.
 
     A SCENE-Net is the best of ``DRAWS`` draws from its ranges, by the F0.5 at its best tau. The
-    kernels of a CNN tell what is around tower voxels from what is around other occupied ones
-    (``discriminant``), with the bias at which F0.5 is highest.
+    kernels of a CNN separate the surroundings of tower voxels from those of other occupied voxels
+    (``discriminant``); its bias is the one with the highest F0.5.
     """
     first = new_model(settings, seed)
     if isinstance(first, CNN):
@@ -105,19 +104,17 @@ def _towards_towers(model: CNN, training: Sequence[VoxelSample], measurement: Me
     kernel = discriminant(training, measurement, model.kernel_size)
     n = len(model.bias)
     with torch.no_grad():
-        # In the size of a random start, so that steps of training mean the same to both.
+        # With the norm of a random start, so that a training step has the same relative size.
         kernel *= model.weight.sum(dim=0).norm() / kernel.norm().clamp(min=1e-9)
         model.weight.mul_(NOISE).add_(kernel / n)
         kernel, _ = model.observer()
-        border = _best_border(kernel, training, measurement)
-        model.bias.fill_(-border / n)
+        level = _best_level(kernel, training, measurement)
+        model.bias.fill_(-level / n)
     return model
 
 
-def _best_border(
-    kernel: Tensor, training: Sequence[VoxelSample], measurement: Measurement
-) -> float:
-    """The answer at the occupied voxels from which on F0.5 is highest."""
+def _best_level(kernel: Tensor, training: Sequence[VoxelSample], measurement: Measurement) -> float:
+    """The response that separates the occupied voxels with the highest F0.5."""
     answers, towers = [], []
     for sample in training:
         occupancy, _ = batch([sample], measurement)
@@ -134,13 +131,13 @@ def _best_border(
 def discriminant(
     samples: Sequence[VoxelSample], measurement: Measurement, size: KernelSize
 ) -> Tensor:
-    """Fisher's linear discriminant of what is around tower voxels and around other occupied ones,
-    (kz, ky, kx): (C + s I)^-1 (m_tower - m_other), with s the mean variance.
+    """Fisher's linear discriminant between the surroundings of tower voxels and those of other
+    occupied voxels, (kz, ky, kx): (C + s I)^-1 (m_tower - m_other), with s the mean variance.
     """
     every, towers = [], []
     rows = max(1, MOST_VOXELS // max(1, len(samples)))
     for sample in samples:
-        # All tower voxels, and of the others evenly as many as there is room for.
+        # All tower voxels, and an even choice of the others within the limit.
         others = np.flatnonzero(~sample.tower)
         others = others[:: -(-len(others) // rows)]
         chosen = np.concatenate([np.flatnonzero(sample.tower), others])
@@ -158,7 +155,7 @@ def discriminant(
 def _patches(
     sample: VoxelSample, rows: np.ndarray, measurement: Measurement, size: KernelSize
 ) -> np.ndarray:
-    """phi around occupied voxels, (R, kz * ky * kx) float32, as a kernel lies on them."""
+    """phi around occupied voxels, (R, kz * ky * kx) float32, in the alignment of a kernel."""
     low = [(k - 1) // 2 for k in size]
     borders = [(a, k - 1 - a) for a, k in zip(low, size, strict=True)]
     volume = np.zeros(sample.grid.n_voxels, np.float32)

@@ -50,8 +50,8 @@ PENALTIES: Mapping[str, Callable[[Tensor], Tensor]] = {
     "linear": lambda numbers: torch.relu(-numbers),
     "quadratic": lambda numbers: torch.relu(-numbers).square(),
 }
-"""h, the penalty on negative numbers (thesis Figure 4.5). The quadratic one was the thesis' first
-(5.3.3): its slope is next to nothing just below zero, where the linear one's is still rho."""
+"""h, the penalty on negative numbers (thesis Figure 4.5). The thesis first used the quadratic one
+(5.3.3), whose slope vanishes just below zero; that of the linear one is rho everywhere below."""
 
 
 def fidelity(
@@ -76,8 +76,7 @@ def fidelity(
 def negativity(model: VoxelModel, settings: LossSettings) -> Tensor:
     """rho_l sum h(lambda_i) + rho_t sum h(theta_i) (thesis Eq. 4.3).
 
-    h is the one of ``PENALTIES`` that ``settings`` name. A model without shape parameters has
-    nothing to penalise.
+    ``settings`` name h in ``PENALTIES``. The penalty of a model without shape parameters is 0.
     """
     if not isinstance(model, GeneoModel):
         return torch.zeros(())

@@ -1,10 +1,10 @@
-"""The numbers of a SCENE-Net in metres, found without a gradient (docs/method/accuracy.md).
+"""What a search maximises: the score of a set of numbers of a SCENE-Net in metres, and its starts.
 
-Eleven numbers need no gradient, and the one of the thesis' loss is the reason for dead starts:
-where the observer is negative, ReLU lets none through. Here whole sets of numbers are drawn, scored
-on the training crops, and drawn again about the better ones: the covariance matrix adaptation of
-Hansen (2016, arXiv:1604.00772). The search begins at the best of many draws over the whole ranges,
-so it never begins where nothing is found as long as any of the draws finds something.
+The gradient of the thesis' loss is zero where the observer is negative (ReLU), which is why some
+models start dead. Eleven numbers can be found without a gradient: sets of numbers are drawn, scored
+on the training crops, and drawn again around the better ones (docs/method/accuracy.md). The search
+starts at the best of many draws over the whole ranges. It therefore starts dead only if every draw
+does.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scenenet.training.cma_es import Score
 
 
 def scorer(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> Score:
-    """Scores a set of numbers by the weighted F0.5 at its own best tau."""
+    """A function from a set of numbers (P,) to its weighted F0.5 at its own best tau."""
 
     def score(numbers: np.ndarray) -> float:
         model.set_numbers(numbers)
@@ -29,7 +29,7 @@ def scorer(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> Score:
 
 
 def draws(model: MetricSceneNet, n: int, rng: np.random.Generator) -> np.ndarray:
-    """(n, P) numbers over the whole ranges; the mixing weights evenly over all there can be."""
+    """(n, P) sets of numbers over the whole ranges; mixing weights uniform over all mixtures."""
     n_mixing = len(model.names) - 1
     share = rng.uniform(0.03, 0.97, (n, model.n_parameters() - n_mixing))
     shapes = np.log(share / (1 - share))

@@ -1,4 +1,4 @@
-"""What is chosen on the validation part: tau, the kernel size, the seed (thesis 5.2.4.1, 5.2.7)."""
+"""The choice of tau, kernel size and seed on the validation part (thesis 5.2.4.1, 5.2.7)."""
 
 from __future__ import annotations
 
@@ -53,9 +53,9 @@ def choose(
     """The model at its best kernel size, its card with tau, and the result of ``tune``.
 
     Args:
-        learnt: crops it was trained on. tau of a SCENE-Net in metres is chosen on these as well:
-            eleven numbers hardly know them by heart, and a single validation crop is too little to
-            choose by. The scores are those of the validation part all the same.
+        learnt: crops that it was trained on. For a SCENE-Net in metres, tau is chosen on these as
+            well: eleven numbers hardly overfit them, and a single validation crop is too little
+            for the choice. The scores are still those of the validation part alone.
     """
     candidates: list[VoxelModel] = [model]
     candidates += model.with_kernel_sizes(settings.kernel_sizes)

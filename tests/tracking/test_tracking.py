@@ -328,7 +328,7 @@ def test_a_database_with_runs_of_others_is_kept(empty_database, tmp_path):
 def test_two_processes_may_make_the_store_at_once(tmp_path):
     started = [create_in_a_process_of_its_own(tmp_path, f"{n}.json") for n in range(2)]
     for process in started:
-        _, errors = process.communicate(timeout=120)
+        _, errors = process.communicate(timeout=600)
         assert process.returncode == 0, errors
     assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -18,8 +18,9 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 import hypothesis
 import numpy as np
 import pytest
+from fixtures.scenes import PLACE, make_pole_finder, make_scene
 
-from scenenet.pointcloud import PointCloud, class_scheme
+from scenenet.pointcloud import PointCloud
 
 # The same examples each time, so that a test fails because of a change and not because of luck; no
 # deadline, because the first example of some tests waits for a compiler.
@@ -57,29 +58,6 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log):
     return LoadFileScheduling(config, log)
 
 
-PLACE = np.array([500_000.0, 4_630_000.0, 100.0])
-"""Origin of the small scenes, m: far from zero like surveys; float32 cannot resolve metres."""
-GROUND, TREE, TOWER = 2, 4, 15
-SCENE_WIDTH_M = 30.0
-
-POLE_NUMBERS = {
-    "cylinder.r": 0.3,
-    "cylinder.sigma": 0.4,
-    "arrow.r": 0.3,
-    "arrow.sigma": 0.4,
-    "arrow.r_c": 0.3,
-    "arrow.beta": 0.5,
-    "negative_sphere.r": 0.3,
-    "negative_sphere.sigma": 0.4,
-    "negative_sphere.omega": 0.03,
-    "lambda.cylinder": 0.1,
-    "lambda.arrow": 0.1,
-    "lambda.negative_sphere": 0.8,
-}
-"""Parameters of a SCENE-Net that detects a pole on flat ground in voxels of 1 m."""
-POLE_TAU = 0.7
-
-
 @pytest.fixture(scope="session")
 def project_root() -> Path:
     return ROOT
@@ -109,53 +87,13 @@ def real_data() -> Path:
 def scene() -> Callable[..., PointCloud]:
     """A function that makes a small scene: poles and a tree on flat ground, EDP codes."""
 
-    def make(
-        poles: Sequence[tuple[float, float]] = ((15.5, 15.5),),
-        *,
-        height: float = 14.0,
-        size: tuple[float, float] = (SCENE_WIDTH_M, SCENE_WIDTH_M),
-        tree: tuple[float, float] | None = (5.5, 6.5),
-        seed: int = 0,
-    ) -> PointCloud:
-        rng = np.random.default_rng(seed)
-        x, y = (np.arange(0.25, side, 0.5) for side in size)
-        flat = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-        flat = flat + rng.uniform(-0.2, 0.2, flat.shape)
-        parts = [np.column_stack([flat, rng.uniform(0, 0.05, len(flat))])]
-        codes = [np.full(len(flat), GROUND)]
-        for pole in poles:
-            z = np.arange(0.05, height + 1e-9, 0.05)
-            around = np.asarray(pole) + rng.uniform(-0.2, 0.2, (len(z), 2))
-            parts.append(np.column_stack([around, z]))
-            codes.append(np.full(len(z), TOWER))
-        if tree is not None:
-            crown = rng.normal(size=(500, 3)) * [1.2, 1.2, 1.0] + [*tree, 4.0]
-            parts.append(crown)
-            codes.append(np.full(len(crown), TREE))
-        xyz = np.concatenate(parts) + PLACE
-        return PointCloud(xyz, np.concatenate(codes).astype(np.uint8), class_scheme("edp"))
-
-    return make
+    return make_scene
 
 
 @pytest.fixture(scope="session")
 def pole_finder():
     """A SCENE-Net with numbers set by hand, and its card."""
-    from scenenet.models.model_file import ModelCard
-    from scenenet.models.scenenet import SceneNet
-
-    model = SceneNet()
-    model.set_shape_parameters(POLE_NUMBERS)
-    card = ModelCard(
-        name="by-hand",
-        codes="edp",
-        measurement="presence",
-        fit="metric",
-        resolution=64,
-        voxel_size=1.0,
-        tau=POLE_TAU,
-    )
-    return model, card
+    return make_pole_finder()
 
 
 @pytest.fixture(scope="session")

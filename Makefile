@@ -6,13 +6,16 @@ CORES ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
-.PHONY: reproduce test package docs bench pictures lint clean help
+.PHONY: reproduce test trust package docs bench pictures lint clean help
 
 reproduce: $(INSTALLED)  ## all results of the default configuration, under results/
 	$(VENV)/bin/snakemake --cores $(CORES)
 
 test: $(INSTALLED)  ## the tests
 	$(VENV)/bin/python -m pytest -n $(CORES) --no-loadscope-reorder
+
+trust: $(INSTALLED)  ## try to lose something: damaged files, kills, full disks; a table of what was lost
+	PYTHONPATH=tests $(VENV)/bin/python -m trust
 
 package: $(INSTALLED)  ## build the package, install it in a fresh environment and predict with it
 	$(VENV)/bin/python -m pytest -m packaging

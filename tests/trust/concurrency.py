@@ -10,17 +10,16 @@ from pathlib import Path
 
 from trust.kills import tiny_project
 from trust.originals import write_pole_model, write_survey
-from trust.processes import end_of, files_in, has, must, start, wait_for
+from trust.processes import end_of, files_in, has, must, predict, start, wait_for
 from trust.table import Attempt, Subject
 
 
 def _same_survey(folder: Path) -> str | None:
     """Both write the same result, or one of them says why it does not."""
     survey, model = _inputs(folder)
-    predict = ("predict", survey, "--model", model, "--out")
-    must(*predict, folder / "reference")
+    must(*predict(survey, model, folder / "reference"))
     out, tmp = folder / "out", folder / "tmp"
-    processes = [start(*predict, out, tmp=tmp) for _ in range(2)]
+    processes = [start(*predict(survey, model, out), tmp=tmp) for _ in range(2)]
     ended = [end_of(process) for process in processes]
     faults = [done.fault for done in ended if done.fault is not None]
     if faults:
@@ -36,9 +35,7 @@ def _two_surveys(folder: Path) -> str | None:
     other = folder / "other.laz"
     shutil.copy(survey, other)
     out, tmp = folder / "out", folder / "tmp"
-    processes = [
-        start("predict", path, "--model", model, "--out", out, tmp=tmp) for path in (survey, other)
-    ]
+    processes = [start(*predict(path, model, out), tmp=tmp) for path in (survey, other)]
     for process in processes:
         done = end_of(process)
         if done.code != 0:
@@ -53,9 +50,7 @@ def _two_models(folder: Path) -> str | None:
     card = json.loads(model.read_text())
     other.write_text(json.dumps(card | {"name": "other", "tau": 0.9}))
     out, tmp = folder / "out", folder / "tmp"
-    processes = [
-        start("predict", survey, "--model", path, "--out", out, tmp=tmp) for path in (model, other)
-    ]
+    processes = [start(*predict(survey, path, out), tmp=tmp) for path in (model, other)]
     ended = [end_of(process) for process in processes]
     faults = [done.fault for done in ended if done.fault is not None]
     if faults:

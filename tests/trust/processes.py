@@ -43,6 +43,11 @@ class Ended:
         return None
 
 
+def predict(survey: Path, model: Path, out: Path) -> tuple[object, ...]:
+    """Arguments that predict a survey of poles without conductors."""
+    return ("predict", survey, "--model", model, "--out", out, "--min-conductor", 0)
+
+
 def start(*arguments: object, tmp: Path | None = None, max_file: int | None = None):
     """Start a command.
 

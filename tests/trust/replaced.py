@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from fixtures.scenes import make_scene
 from trust.originals import write_pole_model
-from trust.processes import end_of, files_in, has, must, start, wait_for
+from trust.processes import end_of, files_in, has, must, predict, start, wait_for
 from trust.table import Attempt, Subject
 
 from scenenet.pointcloud import PointCloud, write_las
@@ -65,11 +65,10 @@ def _replace(
     folder.mkdir()
     survey, out, tmp = folder / f"{NAME}.laz", folder / "out", folder / "tmp"
     shutil.copy(surveys["original"], survey)
-    predict = ("predict", survey, "--model", model, "--out", out)
-    must(*predict, tmp=tmp)
+    must(*predict(survey, model, out), tmp=tmp)
     before = files_in(out)
     watched, begins = (out, f".{NAME}.laz.") if moment == MOMENTS[0] else (tmp, "scenenet-")
-    process = start(*predict, tmp=tmp)
+    process = start(*predict(survey, model, out), tmp=tmp)
     if not wait_for(lambda: has(watched, begins), process):
         return f"the moment never came: {end_of(process)}"
     process.send_signal(signal.SIGSTOP)
@@ -92,7 +91,7 @@ def _replace(
     if after[name] == before[name]:
         return None
     fresh = folder / "fresh"
-    must("predict", survey, "--model", model, "--out", fresh, tmp=tmp)
+    must(*predict(survey, model, fresh), tmp=tmp)
     if after[name] == files_in(fresh)[name]:
         return None
     return "exit code 0 with a result of neither the one survey nor the other"

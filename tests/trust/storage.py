@@ -17,6 +17,7 @@ from trust.processes import (
     fill_disk,
     has,
     must,
+    predict,
     scenenet,
     small_disk,
     start,
@@ -55,7 +56,7 @@ class _Commands:
 
     def call(self, command: str, out: Path) -> tuple[object, ...]:
         if command == "predict":
-            return (command, self.survey, "--model", self.model, "--out", out)
+            return predict(self.survey, self.model, out)
         if command == "synth":
             return (command, out / "made.laz", "--towers", 2)
         options = ("--resolution", 32, "--protocol", "thesis", "--epochs", 1, "--seeds", 1)

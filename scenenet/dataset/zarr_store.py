@@ -7,6 +7,7 @@ a store that does not match.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -61,8 +62,14 @@ def create(store: str | Path, manifest: str | Path, facts: dict[str, Any]) -> It
 
     with atomic(store) as partial:
         backing = ZipStore(partial, mode="w")
-        writer = StoreWriter(zarr.create_group(backing))
-        yield writer
+        try:
+            writer = StoreWriter(zarr.create_group(backing))
+            yield writer
+        except BaseException:
+            # Else zipfile closes it when it is collected, and prints that it cannot.
+            with contextlib.suppress(OSError):
+                backing.close()
+            raise
         backing.close()
     head = {
         "store": Path(store).name,

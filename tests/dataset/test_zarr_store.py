@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import gc
+import resource
+
 import numpy as np
 import pytest
 
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, OutputError
 from scenenet.core.files import read_json
 from scenenet.dataset.zarr_store import StoreReader, create
 
@@ -93,6 +96,22 @@ def test_an_interrupted_write_leaves_nothing(tmp_path):
     ):
         writer.add("a-0001", ARRAYS)
         raise KeyboardInterrupt
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_store_that_cannot_grow_ends_with_one_message(tmp_path):
+    """What zipfile would print when it is collected fails the test, too (filterwarnings)."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100, hard))
+    try:
+        with (
+            pytest.raises(OutputError, match="limit on file sizes"),
+            create(tmp_path / "s.zarr.zip", tmp_path / "m.json", {}) as writer,
+        ):
+            writer.add("a-0001", ARRAYS)
+        gc.collect()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -31,7 +31,7 @@ CHANGES = {
     "a parameter is no plain dict": "test_rules.py::"
     "test_every_input_and_output_has_a_name_and_the_parameter_is_one_dict",
     "the survey sheet is sorted anew": "test_reruns.py::"
-    "test_the_order_and_the_date_of_the_sheet_decide_on_nothing",
+    "test_the_order_and_the_date_of_the_sheet_have_no_effect",
     "a part of a store is lost": "test_run.py::test_a_store_that_was_damaged_is_refused",
     "one of many files of a survey is deleted": "test_reruns.py::"
     "test_a_deleted_cache_of_voxels_is_made_again",

@@ -7,19 +7,19 @@ if anything was lost.
 from __future__ import annotations
 
 import argparse
+import os
 import shutil
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from trust import concurrency, kills, mutations, replaced, reruns, storage
-from trust.table import run, table
+from trust import concurrency, kills, mutations, recordings, replaced, reruns, storage
+from trust.table import Subject, Tally, run, table
 
-SUBJECTS = [
-    subject
-    for module in (mutations, replaced, storage, concurrency, kills, reruns)
-    for subject in module.SUBJECTS
-]
+MODULES = (reruns, kills, mutations, storage, recordings, replaced, concurrency)
+"""The longest first."""
+SUBJECTS = [subject for module in MODULES for subject in module.SUBJECTS]
 
 
 def main() -> int:
@@ -34,20 +34,24 @@ def main() -> int:
     if not chosen:
         parser.error(f"no subject is called {given.only}: {[s.name for s in SUBJECTS]}")
     work = given.keep or Path(tempfile.mkdtemp(prefix="trust-"))
-    tallies = []
+
+    def do(place: int, subject: Subject) -> Tally:
+        count = min(subject.count, given.count or subject.count)
+        one = given.number is not None and subject.one_by_one
+        numbers = [given.number] if one else range(count)
+        print(f"{subject.name} ...", file=sys.stderr, flush=True)
+        tally = run(subject, work / str(place), given.seed, numbers)
+        print("\n".join([*tally.skipped, *tally.lost, table([tally])]), file=sys.stderr, flush=True)
+        return tally
+
     try:
-        for place, subject in enumerate(chosen):
-            count = min(subject.count, given.count or subject.count)
-            one = given.number is not None and subject.one_by_one
-            numbers = [given.number] if one else range(count)
-            print(f"{subject.name} ...", file=sys.stderr, flush=True)
-            tally = run(subject, work / str(place), given.seed, numbers)
-            for line in (*tally.skipped, *tally.lost):
-                print(line, flush=True)
-            tallies.append(tally)
+        with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+            tallies = list(pool.map(do, range(len(chosen)), chosen))
     finally:
         if given.keep is None:
             shutil.rmtree(work, ignore_errors=True)
+    for tally in tallies:
+        print("\n".join([*tally.skipped, *tally.lost]), end="\n" if tally.lost else "")
     print(table(tallies))
     return int(any(tally.lost for tally in tallies))
 

@@ -9,12 +9,10 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import queue
 import selectors
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -36,50 +34,17 @@ MAX_MEMORY = 2**30
 
 
 def _try(kind: str, folder: Path, seed: int, numbers: Sequence[int]) -> Iterator[Attempt]:
-    todo: queue.SimpleQueue[int] = queue.SimpleQueue()
-    for number in numbers:
-        todo.put(number)
-    done: queue.SimpleQueue[Attempt | BaseException | None] = queue.SimpleQueue()
-    workers = min(len(os.sched_getaffinity(0)), max(1, len(numbers) // 20))
-    threads = [
-        threading.Thread(target=_feed, args=(kind, folder / str(n), seed, todo, done), daemon=True)
-        for n in range(workers)
-    ]
-    for thread in threads:
-        thread.start()
-    ended = 0
-    while ended < workers:
-        result = done.get()
-        if isinstance(result, BaseException):
-            raise result
-        if result is None:
-            ended += 1
-        else:
-            yield result
-
-
-def _feed(kind, folder: Path, seed: int, todo, done) -> None:
-    """Let one worker at a time read the files that are to be done."""
     worker = None
-    folder.mkdir()
     try:
-        while True:
-            try:
-                number = todo.get_nowait()
-            except queue.Empty:
-                break
+        for number in numbers:
             worker = worker or Worker(kind, folder, seed)
-            commands = number % COMMAND_EVERY == 0
-            answer = worker.ask(number, commands)
-            done.put(Attempt(number, answer["what"], answer.get("lost")))
+            answer = worker.ask(number, number % COMMAND_EVERY == 0)
+            yield Attempt(number, answer["what"], answer.get("lost"))
             if "lost" in answer:  # a fresh one, in case it is damaged as well
                 worker = worker.close()
-    except BaseException as error:
-        done.put(error)
     finally:
         if worker is not None:
             worker.close()
-        done.put(None)
 
 
 class Worker:

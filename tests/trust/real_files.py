@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -30,6 +31,8 @@ HUNG_S = 120.0
 """A command that takes longer has hung."""
 LARGE = 1_000_000
 """Points from which on no time is promised."""
+LIMIT_S = 10.0
+"""Time for a file of less than ``LARGE`` points on an idle machine, s."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,13 @@ class Outcome:
     message: str
     faults: tuple[str, ...]
     n_points: int = 0
+
+
+def real_files() -> list[Path]:
+    """The awkward files and the field recordings; none where there are no real recordings."""
+    root = Path(__file__).resolve().parents[3] / "shared" / "data"
+    data = Path(os.environ.get("SCENENET_REAL_DATA", root))
+    return sorted(path for folder in ("zoo", "field") for path in (data / folder).glob("*.la[sz]"))
 
 
 def look_at(files: Iterable[Path], model: Path) -> Iterator[Outcome]:

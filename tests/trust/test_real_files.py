@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import laspy
 import numpy as np
 import pytest
-from trust.real_files import LARGE, differences, look_at
+from trust.real_files import LARGE, LIMIT_S, differences, look_at, real_files
 
 from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, add_dimensions, write_las
-
-LIMIT_S = 10.0
-"""Time for a file of less than ``LARGE`` points on an idle machine, s."""
-
-
-def real_files() -> list[Path]:
-    """The awkward files and the field recordings; none where there are no real recordings."""
-    root = Path(__file__).resolve().parents[3] / "shared" / "data"
-    data = Path(os.environ.get("SCENENET_REAL_DATA", root))
-    return sorted(path for folder in ("zoo", "field") for path in (data / folder).glob("*.la[sz]"))
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -69,10 +71,13 @@ def _two_workflows(folder: Path) -> str | None:
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
+        start_new_session=True,
     )
     if not wait_for(lambda: has(project.folder / ".snakemake/locks", "0."), first):
         raise RuntimeError(f"the workflow took no lock: {first.communicate()[0]}")
+    os.killpg(first.pid, signal.SIGSTOP)  # or it could end before the second one looks
     second = project.snakemake("--cores", "1", target)
+    os.killpg(first.pid, signal.SIGCONT)
     shown, _ = first.communicate()
     if second.returncode == 0 or "lock" not in second.stdout:
         return f"the second run ended with {second.returncode}: {second.stdout[-400:]}"

@@ -36,13 +36,8 @@ def main() -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     contents = originals(kind)
     path = folder / f"case{SUFFIX[kind]}"
-    survey, model, out = folder / "survey.laz", folder / "model.json", folder / "out"
-    write_survey(survey)
-    write_pole_model(model)
-    if kind in MODELS:
-        commands = [["predict", survey, "--model", path, "--out", out]]
-    else:
-        commands = [["check", path], ["predict", path, "--model", model, "--out", out]]
+    out = folder / "out"
+    commands: list[list[object]] = []
     read = _read_model if kind in MODELS else _read_survey
     read_intact(read, path, contents)
     print("ready", file=answers)
@@ -52,11 +47,22 @@ def main() -> None:
         path.write_bytes(data)
         lost = _within_memory(lambda: read(path))
         if lost is None and through_commands:
+            commands = commands or _commands(kind, path, folder, out)
             for command in commands:
                 lost = lost or _within_memory(lambda command=command: _called(command))
             shutil.rmtree(out, ignore_errors=True)
         answer = {"what": what} if lost is None else {"what": what, "lost": lost}
         print(json.dumps(answer), file=answers)
+
+
+def _commands(kind: str, path: Path, folder: Path, out: Path) -> list[list[object]]:
+    """The command lines that read the file, with the other files that they need."""
+    survey, model = folder / "survey.laz", folder / "model.json"
+    write_survey(survey)
+    write_pole_model(model)
+    if kind in MODELS:
+        return [["predict", survey, "--model", path, "--out", out]]
+    return [["check", path], ["predict", path, "--model", model, "--out", out]]
 
 
 def read_intact(read: Callable[[Path], str | None], path: Path, contents: list[bytes]) -> None:

@@ -43,7 +43,7 @@ def test_a_killed_prediction_leaves_nothing_and_is_made_by_the_next_start(tmp_pa
 
 
 def test_a_full_disk_leaves_a_message_and_no_result(tmp_path):
-    number = storage.LIMIT_CASES.index(("predict", 20_000))
+    number = storage.LIMIT_CASES.index(("synth", 1000))  # predict: tests/cli/test_outputs.py
     nothing_lost(named(storage, "disk full: limit on file sizes"), tmp_path, [number])
 
 

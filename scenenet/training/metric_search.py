@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import PreparedCrop, curve_of, prepare_crops
 from scenenet.models.settings import ModelSettings, SearchSettings
 from scenenet.training import checkpoint as checkpoints
-from scenenet.training.cma_es import Score, State, advance, begin, settled
+from scenenet.training.evolution import Score, State, advance, begin, settled
 from scenenet.training.objective import draws, scorer
 
 
@@ -59,9 +58,7 @@ def fit_by_search(
     label = f"{settings.name} seed {seed}: generations"
     for generation in track(range(state.generation + 1, search.generations + 1), label):
         started = time.perf_counter()
-        # The draws depend on these numbers alone, so a resumed search draws the same.
-        rng = np.random.default_rng([seed, chosen, generation])
-        state = advance(state, score, search.population, rng)
+        state = advance(state, score)
         if generation == search.generations:
             state = settled(state, score)
         history.append(row(state, time.perf_counter() - started) | {"search": chosen})
@@ -79,10 +76,9 @@ def _trial(
     why several searches start.
     """
     starts = draws(model, settings.starts, np.random.default_rng([*entropy, 0]))
-    states = [begin(starts, score, settings.step)]
-    for generation in range(1, min(settings.trial, settings.generations - 1) + 1):
-        rng = np.random.default_rng([*entropy, generation])
-        states.append(advance(states[-1], score, settings.population, rng))
+    states = [begin(starts, score, settings.step, settings.population, entropy)]
+    for _ in range(min(settings.trial, settings.generations - 1)):
+        states.append(advance(states[-1], score))
     return states
 
 
@@ -103,7 +99,7 @@ def _row(
 def _save(
     checkpoint: checkpoints.Checkpoint, state: State, history: list[dict[str, float]]
 ) -> None:
-    fields = asdict(state)
+    fields = {name: value for name, value in vars(state).items() if name != "live"}
     arrays = {name: value for name, value in fields.items() if isinstance(value, np.ndarray)}
     plain = {name: value for name, value in fields.items() if name not in arrays}
     checkpoint.write(checkpoints.State(arrays, {"state": plain, "history": history}))

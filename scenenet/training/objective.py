@@ -15,7 +15,7 @@ import numpy as np
 
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import PreparedCrop, curve_of
-from scenenet.training.cma_es import Score
+from scenenet.training.evolution import Score
 
 
 def scorer(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> Score:

@@ -20,7 +20,7 @@ from scenenet.models.predictions import (
 )
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings
-from scenenet.training.cma_es import NEAR_BEST, advance, begin, settled
+from scenenet.training.evolution import NEAR_BEST, State, advance, begin, settled
 from scenenet.training.objective import draws
 
 
@@ -35,20 +35,20 @@ def bowl(x: np.ndarray) -> float:
 
 
 def test_the_search_climbs_a_narrow_ridge():
-    state = begin(np.zeros((1, 4)), bowl, 0.5)
-    for generation in range(150):
-        state = advance(state, bowl, 12, np.random.default_rng([0, generation]))
+    state = begin(np.zeros((1, 4)), bowl, 0.5, 12, [0])
+    for _ in range(150):
+        state = advance(state, bowl)
     assert state.generation == 150
     np.testing.assert_allclose(settled(state, bowl).best, [1, 2, 3, 4], atol=1e-3)
 
 
 def test_the_search_starts_at_the_best_draw_and_keeps_the_best():
     starts = np.array([[9.0, 9.0], [1.0, 2.5], [-3.0, 0.0]])
-    state = begin(starts, bowl, 0.1)
+    state = begin(starts, bowl, 0.1, 8, [0])
     assert state.best.tolist() == [1.0, 2.5]
     scores = [state.best_score]
-    for generation in range(20):
-        state = advance(state, bowl, 8, np.random.default_rng(generation))
+    for _ in range(20):
+        state = advance(state, bowl)
         scores.append(state.best_score)
         assert bowl(state.best) == state.best_score
     assert scores == sorted(scores)
@@ -58,8 +58,8 @@ def test_the_mean_is_returned_unless_the_best_draw_is_clearly_better():
     def score(x):
         return float(x[0])
 
-    state = begin(np.array([[0.5]]), score, 0.1)
-    middle = settled(advance(state, score, 6, np.random.default_rng(0)), score)
+    state = begin(np.array([[0.5, 0.0]]), score, 0.1, 6, [0])
+    middle = settled(advance(state, score), score)
     assert middle.best_score >= 0.5 - NEAR_BEST
 
 
@@ -114,3 +114,14 @@ def test_prepared_crops_give_the_probabilities_of_the_model(scene, voxel_size):
     curve = curve_of(net, [ready])
     counts = curve.confusion(100)
     assert counts == confusion(probability, truth, float(np.float32(THRESHOLDS[100])))
+
+
+def test_a_search_goes_on_from_its_seed_and_scores_as_if_it_had_not_stopped():
+    state = begin(np.zeros((1, 4)), bowl, 0.5, 12, [3, 1])
+    for _ in range(10):
+        state = advance(state, bowl)
+    kept = State(state.first, state.step, state.seed, state.scores, state.best, state.best_score)
+    for _ in range(10):
+        state, kept = advance(state, bowl), advance(kept, bowl)
+    np.testing.assert_array_equal(kept.scores, state.scores)
+    np.testing.assert_array_equal(settled(kept, bowl).best, settled(state, bowl).best)

@@ -48,7 +48,7 @@ def test_every_input_and_output_has_a_name_and_the_parameter_is_one_dict(project
             entries = [e for e in directives.get(directive, []) if re.match(r"[^\s)\]}#]", e)]
             unnamed = [e for e in entries if not re.match(r"\w+=|\*\*\w+\(", e)]
             assert not unnamed, (name, directive)
-        assert [e.partition("=")[0] for e in directives["params"] if e[0] not in " )"] == ["job"]
+        assert [e.partition("=")[0] for e in directives["params"] if e[0] not in " )#"] == ["job"]
 
 
 def test_every_stage_has_a_script_and_every_script_a_rule(project_root):

@@ -74,6 +74,9 @@ def warn(file: str | Path, warnings: Iterable[str]) -> None:
         print(f"warning: {file}: {warning}", file=sys.stderr)
 
 
+ENOUGH_BYTES = 1 << 26
+"""With more free bytes than this, an error that names no file may come from another disk."""
+
 _STORAGE = {
     errno.ENOSPC: ("the disk is full", "Free space, or choose another disk"),
     errno.EDQUOT: ("the disk quota is used up", "Free space, or choose another disk"),
@@ -99,7 +102,11 @@ def output_error(path: str | Path, reason: OSError, what: str = "the file") -> O
         path = path.parent.parent / path.name
     problem, remedy = _STORAGE[reason.errno]
     if reason.errno in (errno.ENOSPC, errno.EDQUOT):
-        problem += f" ({free_space(path) / 1e6:,.1f} MB are free)"
+        free = free_space(path)
+        problem += f" ({free / 1e6:,.1f} MB are free)"
+        if reason.filename is None and free > ENOUGH_BYTES:
+            problem += ", after the incomplete files were removed, or another disk is full"
+            remedy += ". Other disks are those of TMPDIR and NUMBA_CACHE_DIR (compiled code)"
     return OutputError(f"{what} cannot be written: {problem}", file=path, remedy=remedy)
 
 

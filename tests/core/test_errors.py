@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import pickle
 
 import pytest
 
-from scenenet.core.errors import InputError, in_file, warn
+from scenenet.core.errors import InputError, in_file, output_error, warn
 
 
 @pytest.mark.parametrize(
@@ -45,3 +46,14 @@ def test_a_file_and_a_place_are_added_where_they_are_missing():
 def test_warnings_name_their_file_on_stderr(capsys):
     warn("a.laz", ["odd", "very odd"])
     assert capsys.readouterr() == ("", "warning: a.laz: odd\nwarning: a.laz: very odd\n")
+
+
+def test_an_error_without_a_file_may_come_from_another_disk(tmp_path, monkeypatch):
+    reason = OSError(errno.ENOSPC, "No space left on device")
+    monkeypatch.setattr("scenenet.core.errors.free_space", lambda path: 1000)
+    small = str(output_error(tmp_path / "a.laz", reason))
+    assert small.endswith("the disk is full (0.0 MB are free). Free space, or choose another disk")
+    monkeypatch.setattr("scenenet.core.errors.free_space", lambda path: 10**12)
+    large = str(output_error(tmp_path / "a.laz", reason))
+    assert "or another disk is full" in large
+    assert "NUMBA_CACHE_DIR" in large

@@ -19,6 +19,7 @@ from scenenet.prediction.occupied_voxels import OccupiedVoxels
 from scenenet.prediction.tiling import EDGE, Tile, TileSpool, code_of, groups
 
 if TYPE_CHECKING:
+    from scenenet.dataset.voxels import Measurement
     from scenenet.models.base import VoxelModel
     from scenenet.models.model_file import ModelCard
 
@@ -86,8 +87,9 @@ class TilePredictions:
         if card.measurement == "density":
             # One maximum for the whole survey: one for each tile would show as seams.
             fullest = max((int(tile.count.max()) for tile in self.spool.tiles()), default=1)
+        predict = TilePredictor(model, card.measurement, self.spool.voxel_size, fullest)
         for tile in track(self.spool.tiles(), label, total=len(self.spool)):
-            probability, shares = predict_tile(self.spool, tile, model, card, fullest)
+            probability, shares = predict(self.spool, tile)
             tower = np.zeros(len(tile.voxel), np.uint32)
             prediction = TilePrediction(tile.voxel, probability, shares, tower)
             prediction.save(self._path(code_of(tile.place)))
@@ -182,47 +184,66 @@ class TilePredictions:
         return self._folder / f"{code}.npz"
 
 
-def predict_tile(
-    spool: TileSpool, tile: Tile, model: VoxelModel, card: ModelCard, fullest: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Probability (M,) and shares (M, K) at the occupied voxels of a tile.
+class TilePredictor:
+    """A model at the voxel size of a survey. Its kernels are sampled once, for all tiles."""
 
-    The halo is as wide as the reach of the kernels, so that every voxel gets the value that it
-    would have without tiles.
+    def __init__(
+        self, model: VoxelModel, measurement: Measurement, voxel_size: float, fullest: int
+    ) -> None:
+        """Sample the kernels.
 
-    Args:
-        fullest: points in the fullest voxel of the survey, for measurement ``density``.
-    """
-    import torch
+        Args:
+            measurement: of the model (``ModelCard``).
+            voxel_size: m.
+            fullest: points in the fullest voxel of the survey, for measurement ``density``.
+        """
+        import torch
 
-    from scenenet.convolution.convolve import convolve_at_voxels
-    from scenenet.convolution.occupancy import Occupancy
-    from scenenet.models.geneo_model import GeneoModel
+        from scenenet.models.geneo_model import GeneoModel
 
-    model = model.at(spool.voxel_size)
-    reach = model.reach
-    shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
-    scene = spool.around(tile.place, reach)
-    density = card.measurement == "density"
-    phi = [(scene.count / fullest).astype(np.float32)] if density else None
-    occupancy = Occupancy.of_grids([scene.voxel], phi, shape)
-    inner = _inner(scene.voxel, shape, reach)
-    with torch.no_grad():
-        if isinstance(model, GeneoModel):
-            parts = convolve_at_voxels(occupancy, model.weighted_kernels())
-            # The shares are those of the voxel that the maximum of the cross-section comes from.
-            rows = model.argmax_rows(occupancy, parts.sum(dim=0))[inner]
-            parts = parts[:, torch.from_numpy(rows)]
-            observed = parts.sum(dim=0)
-            weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
-            shares = (parts / weight).T.contiguous().numpy()
-        else:
-            kernel, bias = model.observer()
-            observed = convolve_at_voxels(occupancy, kernel[None])[0, inner]
-            observed = observed if bias is None else observed + bias
-            shares = np.empty((len(tile.voxel), 0), np.float32)
-        probability = torch.relu(torch.tanh(observed)).numpy()
-    return probability, shares
+        self.model = model.at(voxel_size)
+        self._fullest = fullest if measurement == "density" else None
+        self._bias: torch.Tensor | None = None
+        with torch.no_grad():
+            if isinstance(self.model, GeneoModel):
+                self._kernels = self.model.weighted_kernels()
+            else:
+                kernel, self._bias = self.model.observer()
+                self._kernels = kernel[None]
+
+    def __call__(self, spool: TileSpool, tile: Tile) -> tuple[np.ndarray, np.ndarray]:
+        """Probability (M,) and shares (M, K) at the occupied voxels of a tile.
+
+        The halo is as wide as the reach of the kernels, so that every voxel gets the value that it
+        would have without tiles.
+        """
+        import torch
+
+        from scenenet.convolution.convolve import convolve_at_voxels
+        from scenenet.convolution.occupancy import Occupancy
+        from scenenet.models.geneo_model import GeneoModel
+
+        reach = self.model.reach
+        shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
+        scene = spool.around(tile.place, reach)
+        phi = None if self._fullest is None else [(scene.count / self._fullest).astype(np.float32)]
+        occupancy = Occupancy.of_grids([scene.voxel], phi, shape)
+        inner = _inner(scene.voxel, shape, reach)
+        with torch.no_grad():
+            parts = convolve_at_voxels(occupancy, self._kernels)
+            if isinstance(self.model, GeneoModel):
+                # The shares are those of the voxel that the maximum of the cross-section is from.
+                rows = self.model.argmax_rows(occupancy, parts.sum(dim=0))[inner]
+                parts = parts[:, torch.from_numpy(rows)]
+                observed = parts.sum(dim=0)
+                weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
+                shares = (parts / weight).T.contiguous().numpy()
+            else:
+                observed = parts[0, inner]
+                observed = observed if self._bias is None else observed + self._bias
+                shares = np.empty((len(tile.voxel), 0), np.float32)
+            probability = torch.relu(torch.tanh(observed)).numpy()
+        return probability, shares
 
 
 def _inner(

@@ -14,7 +14,7 @@ from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
 from scenenet.models.cnn import CNN
 from scenenet.models.scenenet import SceneNet
-from scenenet.prediction.tile_predictions import predict_tile
+from scenenet.prediction.tile_predictions import TilePredictor
 from scenenet.prediction.tiling import EDGE, TileSpool, code_of, groups
 
 ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])
@@ -133,21 +133,14 @@ def test_groups_have_the_rows_of_each_code(codes):
         assert rows.tolist() == [i for i, c in enumerate(codes) if c == code]
 
 
-class Card:
-    """A model card with the fields that predict_tile reads."""
-
-    def __init__(self, measurement: str) -> None:
-        self.measurement = measurement
-
-
 def seamless(spool: TileSpool, model, measurement: str) -> tuple[np.ndarray, np.ndarray]:
     """Probability at every occupied voxel: in tiles, and in one dense piece."""
     voxels = voxels_of(spool)
     fullest = max(voxels.values())
-    card = Card(measurement)
+    predict = TilePredictor(model, measurement, spool.voxel_size, fullest)
     in_tiles = {}
     for tile in spool.tiles():
-        probability, _ = predict_tile(spool, tile, model, card, fullest)
+        probability, _ = predict(spool, tile)
         in_tiles |= dict(zip(map(tuple, tile.zyx().tolist()), probability.tolist(), strict=True))
     zyx = np.array(list(voxels))
     low = zyx.min(axis=0)
@@ -189,8 +182,9 @@ def test_the_position_of_tiles_has_no_effect(tmp_path_factory, shift, seed):
     for moved in (xyz, xyz + np.array(shift)[::-1]):
         spool = spooled(tmp_path_factory.mktemp("tiles"), moved)
         found = {}
+        predict = TilePredictor(model, "presence", spool.voxel_size, 1)
         for tile in spool.tiles():
-            probability, _ = predict_tile(spool, tile, model, Card("presence"), 1)
+            probability, _ = predict(spool, tile)
             found |= dict(zip(map(tuple, tile.zyx().tolist()), probability.tolist(), strict=True))
         predictions.append(found)
     here, there = predictions

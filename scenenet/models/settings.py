@@ -144,7 +144,7 @@ class TrainingSettings(Settings):
     epochs: int = Field(50, ge=1, description="passes over the training set")
     batch_size: int = Field(8, ge=1, description="crops per step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
-    learning_rate: float = Field(0.001, gt=0, le=1e30, description="step size of the optimiser")
+    learning_rate: float = Field(0.001, gt=0, le=1e38, description="step size of the optimiser")
     decay: float = Field(
         0.0, ge=0, lt=1, description="share by which the learning rate decreases (5.3.4)"
     )

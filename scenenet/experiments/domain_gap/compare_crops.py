@@ -143,15 +143,17 @@ class Separability:
     features: pd.Series
 
 
-def crop_separability(real: pd.DataFrame, synthetic: pd.DataFrame) -> Separability:
-    """Separate crops by numbers of whole crops, a row each."""
+def crop_separability(
+    real: pd.DataFrame, synthetic: pd.DataFrame, repeats: int = REPEATS
+) -> Separability:
+    """Separate crops by numbers of whole crops, a row each; ``repeats`` as below."""
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import StratifiedKFold, cross_val_predict
 
     x = pd.concat((real, synthetic), ignore_index=True)
     y = np.r_[np.ones(len(real), int), np.zeros(len(synthetic), int)]
     scores = []
-    for repeat in range(REPEATS):
+    for repeat in range(repeats):
         folds = StratifiedKFold(min(FOLDS, len(real)), shuffle=True, random_state=repeat)
         # There are few real crops, so leaves must be small.
         model = _classifier(leaf=2)

@@ -45,7 +45,7 @@ def test_similar_crops_are_not_separable_and_different_ones_are(measured):
     voxels, crops = voxel_separability(first, bare, repeats=1)
     assert voxels.auc > 0.6
     assert crops.auc > 0.8
-    test = crop_separability(first.properties, bare.properties)
+    test = crop_separability(first.properties, bare.properties, repeats=2)
     assert test.auc > 0.7
     assert {"canopy_cover", "tall_density", "class_12"} & set(test.features.index[:8])
 
@@ -89,7 +89,7 @@ def test_default_corridors_are_like_the_public_crops(real_data):
 def test_one_differing_property_is_enough_to_separate():
     left = pd.DataFrame({"a": np.arange(10.0), "b": np.ones(10)})
     right = pd.DataFrame({"a": 100 + np.arange(30.0), "b": np.ones(30)})
-    test = crop_separability(left, right)
+    test = crop_separability(left, right, repeats=2)
     assert test.auc > 0.99
     assert test.features["a"] == 1.0
     assert test.features["b"] == 0.5

@@ -22,8 +22,7 @@ rule tables:
     output:
         tables=[table_in_report(f"{R}/tables/{name}.csv") for name in table_names()],
         comparisons=[
-            table_in_report(f"{R}/tables/{name}.csv")
-            for name in (COMPARISON, TIMES_COMPARISON)
+            table_in_report(f"{R}/tables/{name}.csv") for name in (COMPARISON, TIMES_COMPARISON)
         ],
         scores=f"{R}/tables/scores.json",
         provenance=f"{R}/tables/provenance.json",

@@ -27,7 +27,8 @@ def every(stage, output, **values):
 
 def every_output():
     """Rule -> every file that it makes, for all rules so far. Synthetic surveys are no targets: what
-    is made from them is complete without them, and to make one again would train everything again."""
+    is made from them is complete without them, and to make one again would train everything again.
+    """
     return {
         name: [file for output in rule.output.keys() for file in _files(rule, output, {})]
         for name, rule in rules._rules.items()

@@ -50,6 +50,10 @@ SLOW_IMPORTS = ("pyproj", "requests")
 
 POINTWISE, LAYERED = 1, 3
 """Compressors: one stream of points, and chunks with a layer for each field."""
+LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
+"""Kind of an item of a point -> its layers: the fields of formats 6 to 10, colours, colours with
+infrared, and the waveform packet. Extra bytes have a layer each."""
+EXTRA_BYTES_ITEM = 14
 MIN_CHUNK_BYTES = 20
 """A chunk with points has at least one whole point; some writers add an empty one."""
 LEFT_OVER = 1
@@ -81,9 +85,14 @@ def check_count(header: laspy.LasHeader, job: Mapping[str, Any], out: BinaryIO) 
             chunks.pop()
         start, held = stream.tell(), 0
         if compressor == LAYERED:
+            whole, layers = header.point_format.size, _layers(record)
             for _, size in chunks:
-                stream.seek(start + header.point_format.size)
-                held += int.from_bytes(stream.read(4), "little")
+                stream.seek(start + whole)
+                count, *lengths = struct.unpack(f"<{1 + layers}I", stream.read(4 + 4 * layers))
+                if whole + 4 + 4 * layers + sum(lengths) > size:
+                    # The decoder would take that much memory before it found out.
+                    raise ValueError(f"layers of {sum(lengths)} bytes in a chunk of {size} bytes")
+                held += count
                 start += size
         elif layout.uses_variable_size_chunks():
             held = sum(points for points, _ in chunks)
@@ -97,6 +106,16 @@ def check_count(header: laspy.LasHeader, job: Mapping[str, Any], out: BinaryIO) 
         raise WrongCountError(
             f"the header claims {header.point_count} points, but the compressed chunks hold {held}"
         )
+
+
+def _layers(record: bytes) -> int:
+    """Number of layers of a chunk, from the items that the record of the compression lists."""
+    items = struct.unpack_from("<H", record, 32)[0]
+    layers = 0
+    for item in range(items):
+        kind, size = struct.unpack_from("<HH", record, 34 + 6 * item)
+        layers += size if kind == EXTRA_BYTES_ITEM else LAYERS[kind]
+    return layers
 
 
 def _check_last(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from scenenet.core.errors import InputError
-from scenenet.pointcloud import read, survey_info
+from scenenet.pointcloud import PointCloud, iter_chunks, read, survey_info, write_las
 from scenenet.pointcloud.las.header import read_header
 
 LEGACY_COUNT, COUNT = 107, 247
@@ -190,3 +190,16 @@ def test_a_real_file_with_half_its_count_is_refused_or_warned_about(path, patche
         assert path.suffix == ".las", "a compressed file says how many points it has"
         assert points == n // 2
         assert any("which are not read" in text for text in survey_info(half).warnings)
+
+
+def test_layers_longer_than_their_chunk_are_refused_before_memory_is_taken(tmp_path):
+    path = tmp_path / "survey.laz"
+    xyz = np.random.default_rng(0).uniform(0, 50, (2000, 3))
+    write_las(path, PointCloud(xyz, np.full(2000, 2, np.uint8)))
+    with laspy.open(path) as reader:
+        at = reader.header.offset_to_point_data + 8 + reader.header.point_format.size + 4
+    damaged = bytearray(path.read_bytes())
+    damaged[at : at + 4] = (3_800_000_000).to_bytes(4, "little")
+    path.write_bytes(damaged)
+    with pytest.raises(InputError, match=r"layers of 38.* bytes in a chunk of"):
+        list(iter_chunks(path))

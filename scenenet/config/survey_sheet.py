@@ -34,6 +34,7 @@ RESULTS = "{results_dir}"
 
 REPEATED = re.compile(r"(.+)\1{19}$")
 """Names that Snakemake takes for an endless recursion (``PeriodicWildcardError``)."""
+REPEATS = "ends in 20 or more repetitions, which Snakemake refuses"
 
 TS40K = "ts40k"
 """Name of the survey made of the folder of TS40K samples."""
@@ -204,9 +205,7 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
             f"such as {file_name(name)!r}"
         )
     if REPEATED.search(name):
-        problems.append(
-            f"survey {name!r} ends in 20 or more repetitions, which Snakemake refuses in a name"
-        )
+        problems.append(f"survey {name!r} {REPEATS}")
     problems += _unknown("codes", codes, tuple(SCHEMES))
     problems += _unknown("role", role, get_args(Role))
     if fault:
@@ -302,7 +301,7 @@ def _inbox(
         owners.setdefault(_inbox_name(file), []).append(file.name)
     for file in files:
         path, name = str(Path(config.new_surveys.folder) / file.name), _inbox_name(file)
-        reason = _why_left_out(file, name, owners[name])
+        reason = _why_left_out(file, path, name, owners[name])
         if reason is None:
             yield Survey(name, path, config.new_surveys.codes, "new")
         else:
@@ -313,19 +312,21 @@ def _inbox_name(file: Path) -> str:
     return file_name(file.stem.removesuffix(".copc"))
 
 
-def _why_left_out(file: Path, name: str, owners: list[str]) -> str | None:
+def _why_left_out(file: Path, path: str, name: str, owners: list[str]) -> str | None:
     """Why a file of the inbox cannot be a survey of the workflow; None if it can.
 
     Args:
+        path: of the file, relative to the root of the project.
+        name: of its survey.
         owners: the files whose survey would be called ``name``. None of those in the inbox is used,
             as one would replace the results of the other.
     """
     if fault := _unreachable(file):
         return f"{fault}. Mend or remove it"
-    if set("{}") & set(str(file)):
-        return "Snakemake reads { and } in a path as a wildcard. Rename the file"
+    if fault := path_fault(path):
+        return f"the path {fault}. Rename the file"
     if REPEATED.search(name):
-        return "Snakemake refuses a name that ends in 20 or more repetitions. Rename the file"
+        return f"the name {REPEATS}. Rename the file"
     if len(owners) > 1:
         return f"two surveys would be called {name!r}: {' and '.join(owners)}. Rename one of them"
     return None

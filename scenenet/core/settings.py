@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, TypeVar
@@ -22,9 +23,9 @@ def path_fault(text: str) -> str | None:
         return f"has the control character {found.group()!r}"
     if "{" in text or "}" in text:
         return "has a brace, which Snakemake reads as a wildcard"
-    if len(text.encode()) > LONGEST_PATH:
-        return f"has {len(text.encode())} bytes, more than the {LONGEST_PATH} of a path"
-    longest = max(len(name.encode()) for name in text.split("/"))
+    if len(os.fsencode(text)) > LONGEST_PATH:
+        return f"has {len(os.fsencode(text))} bytes, more than the {LONGEST_PATH} of a path"
+    longest = max(len(os.fsencode(name)) for name in text.split("/"))
     if longest > LONGEST_NAME:
         return f"has a name of {longest} bytes, more than the {LONGEST_NAME} of a file name"
     return None

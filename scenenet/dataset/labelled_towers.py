@@ -100,7 +100,7 @@ def survey_towers(path: str | Path, codes: str, settings: TowerSettings) -> Labe
 def find_towers(xyz: np.ndarray, settings: TowerSettings) -> LabelledTowers:
     """Group tower points (N, 3), xyz in m, into instances and measure each."""
     groups = cluster(xyz, settings)
-    left_out = pd.DataFrame(_left_out(xyz, groups, settings), columns=list(LEFT_OUT_COLUMNS))
+    left_out = pd.DataFrame(_left_out(xyz, groups), columns=list(LEFT_OUT_COLUMNS))
     rows = [_measure(xyz[groups.tower == n]) for n in range(groups.tower.max(initial=-1) + 1)]
     if not rows:
         return LabelledTowers(pd.DataFrame(columns=list(COLUMNS)), left_out)
@@ -120,11 +120,13 @@ class Groups:
     Attributes:
         tower: (N,) int, the tower of each point from 0; -1 for none.
         left_out: (N,) int, the group of each point that is no tower from 0; -1 for points of a
-            tower, and for scattered points.
+            tower.
+        reasons: of each group of ``left_out``, why it is no tower.
     """
 
     tower: np.ndarray
     left_out: np.ndarray
+    reasons: tuple[str, ...]
 
 
 def cluster(xyz: np.ndarray, settings: TowerSettings) -> Groups:
@@ -136,17 +138,23 @@ def cluster(xyz: np.ndarray, settings: TowerSettings) -> Groups:
     """
     tower = _dbscan(xyz, settings.min_points, settings)
     left_out = np.full(len(xyz), -1)
+    reasons: list[str] = []
     rest = np.flatnonzero(tower < 0)
     sparse = _dbscan(xyz[rest], settings.sparse_points, settings)
     dense = xyz[tower >= 0]
-    next_tower, next_left_out = tower.max(initial=-1) + 1, 0
     for label in range(sparse.max(initial=-1) + 1):
         rows = rest[sparse == label]
-        if _why_no_tower(xyz[rows], dense, settings) is None:
-            tower[rows], next_tower = next_tower, next_tower + 1
+        reason = _why_no_tower(xyz[rows], dense, settings)
+        if reason is None:
+            tower[rows] = tower.max() + 1
         else:
-            left_out[rows], next_left_out = next_left_out, next_left_out + 1
-    return Groups(tower, left_out)
+            left_out[rows] = len(reasons)
+            reasons.append(reason)
+    if len(scattered := rest[sparse < 0]):
+        left_out[scattered] = len(reasons)
+        fewest = settings.sparse_points
+        reasons.append(f"fewer than {fewest} of them lie within {settings.eps:g} m")
+    return Groups(tower, left_out, tuple(reasons))
 
 
 def _why_no_tower(xyz: np.ndarray, dense: np.ndarray, settings: TowerSettings) -> str | None:
@@ -164,17 +172,9 @@ def _why_no_tower(xyz: np.ndarray, dense: np.ndarray, settings: TowerSettings) -
     return None
 
 
-def _left_out(xyz: np.ndarray, groups: Groups, settings: TowerSettings) -> list[dict[str, Any]]:
+def _left_out(xyz: np.ndarray, groups: Groups) -> list[dict[str, Any]]:
     """The rows of ``LabelledTowers.left_out``."""
-    dense = xyz[groups.tower >= 0]
-    reasons = {}
-    for label in range(groups.left_out.max(initial=-1) + 1):
-        part = xyz[groups.left_out == label]
-        reasons[label] = part, _why_no_tower(part, dense, settings)
-    scattered = xyz[(groups.tower < 0) & (groups.left_out < 0)]
-    if len(scattered):
-        fewest = settings.sparse_points
-        reasons[-1] = scattered, f"fewer than {fewest} of them lie within {settings.eps:g} m"
+    parts = [xyz[groups.left_out == label] for label in range(len(groups.reasons))]
     return [
         {
             "x": np.median(part[:, 0]),
@@ -183,7 +183,7 @@ def _left_out(xyz: np.ndarray, groups: Groups, settings: TowerSettings) -> list[
             "height": np.ptp(part[:, 2]),
             "reason": reason,
         }
-        for part, reason in reasons.values()
+        for part, reason in zip(parts, groups.reasons, strict=True)
     ]
 
 

@@ -110,13 +110,8 @@ def predict_survey(
     screening = Screening(info)
     with scratch_folder() as scratch:
         spool = TileSpool(scratch, voxel_size)
-        n_points = 0
-        chunks = iter_chunks(survey, chunk_points=settings.chunk_points)
         with unchanged(state), in_file(survey):
-            for chunk in track(chunks, f"{name}: chunks read"):
-                screening.add(chunk.xyz, chunk.classification)
-                spool.add(chunk.xyz)
-                n_points += len(chunk)
+            n_points = _read(survey, spool, screening, settings.chunk_points)
         screening.raise_if_not_metres()
         tiles = TilePredictions(spool, scratch, geneos)
         tiles.compute(trained, card, f"{name}: tiles predicted")
@@ -137,3 +132,14 @@ def predict_survey(
             tiles=tiles,
             started=started,
         )
+
+
+def _read(survey: str | Path, spool: TileSpool, screening: Screening, chunk_points: int) -> int:
+    """Read a survey into ``spool`` and ``screening``; the number of its points."""
+    n_points = 0
+    chunks = iter_chunks(survey, chunk_points=chunk_points)
+    for chunk in track(chunks, f"{Path(survey).name}: chunks read"):
+        screening.add(chunk.xyz, chunk.classification)
+        spool.add(chunk.xyz)
+        n_points += len(chunk)
+    return n_points

@@ -86,7 +86,9 @@ def database_error(database: Path, error: Exception) -> InputError:
         )
     if "disk is full" in text or "disk I/O error" in text:
         return InputError(
-            f"cannot be written ({text})", file=database, remedy="Free space on its disk, run again"
+            f"cannot be written ({text})",
+            file=database,
+            remedy="Free space on its disk, and run again",
         )
     if "no such table" in text or "readonly database" in text or "unable to open" in text:
         return InputError(

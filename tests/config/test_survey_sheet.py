@@ -203,7 +203,7 @@ def test_files_of_the_inbox_with_one_name_are_left_out_and_stop_no_other(root, c
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("a{b}.las", "reads { and } in a path as a wildcard"),
+        ("a{b}.las", "has a brace, which Snakemake reads as a wildcard"),
         ("ab" * 20 + ".las", "20 or more repetitions"),
     ],
 )

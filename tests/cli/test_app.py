@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -9,6 +10,8 @@ import shlex
 import signal
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +84,15 @@ def test_every_example_is_a_valid_call(command):
         arguments = shlex.split(example.partition(" >")[0])
         assert arguments[:2] == ["scenenet", command]
         group.commands[command].make_context(command, arguments[2:])
+
+
+def test_a_learning_rate_out_of_bounds_is_named(tmp_path):
+    out = tmp_path / "m.json"
+    options = ["--protocol", "thesis", "--epochs", 1, "--learning-rate", 1e300]
+    made = scenenet("train", "a.laz", "--codes", "edp", "--out", out, *options)
+    assert made.returncode == 2
+    assert "Invalid value for '--learning-rate'" in made.stderr
+    assert "--protocol thesis" not in made.stderr and "--epochs" not in made.stderr
 
 
 @pytest.mark.parametrize("option", ["--epochs", "--learning-rate"])
@@ -222,13 +234,36 @@ def test_the_command_line_knows_every_class_scheme():
     assert {codes.value for codes in Codes} == set(SCHEMES)
 
 
+def full_pipe() -> tuple[int, int]:
+    """The ends of a pipe with room for nothing: a process that writes to it waits for a reader."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            os.write(writing, b"\n")
+    os.set_blocking(writing, True)
+    return reading, writing
+
+
+def wait_for(condition: Callable[[], object], process: subprocess.Popen[str]) -> None:
+    """Wait for a condition; fail if the process ends before, or after two minutes."""
+    end = time.monotonic() + 120
+    while not condition():
+        assert process.poll() is None, "the process has ended"
+        assert time.monotonic() < end, "nothing has happened"
+        time.sleep(0.02)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path, number):
+    """The signal comes when the survey has been read into temporary files. The process cannot end
+    before, however late the signal is: it waits until its progress is read."""
     out = tmp_path / "out"
     call = [sys.executable, "-c", "from scenenet.cli.app import main; main()", "predict", survey]
-    process = subprocess.Popen(
+    reading, writing = full_pipe()
+    with subprocess.Popen(
         [*map(str, call), "--model", str(model), "--out", str(out)],
-        stderr=subprocess.PIPE,
+        stderr=writing,
         text=True,
         env=os.environ | {"TMPDIR": str(tmp_path)},
         # Under some runners Ctrl-C is ignored, and children inherit that.
@@ -236,11 +271,12 @@ def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path
             signal.signal(signal.SIGINT, signal.default_int_handler),
             signal.signal(signal.SIGHUP, signal.SIG_DFL),
         ],
-    )
-    assert process.stderr is not None
-    output = process.stderr.readline()  # the survey has been read, the tiles come next
-    process.send_signal(number)
-    output += process.communicate(timeout=60)[1]
+    ) as process:
+        os.close(writing)
+        with os.fdopen(reading) as stderr:
+            wait_for(lambda: list(tmp_path.glob("scenenet-*/files/*.voxels")), process)
+            process.send_signal(number)
+            output = stderr.read()
     assert process.returncode == 128 + number
     assert "no incomplete file was left" in output and "Traceback" not in output
     assert list(tmp_path.iterdir()) in ([], [out])

@@ -70,14 +70,22 @@ class VoxelGrid:
         box is widened about its middle to the longest side, as in the published code.
 
         Raises:
-            InputError: there are no points, or all have the same coordinates.
+            InputError: there are no points, all have the same coordinates, or the voxels would be
+                smaller than ``SMALLEST_VOXEL`` or larger than ``LARGEST_VOXEL``.
         """
         low, high = _bounds(xyz)
         side = float((high - low).max())
         if side <= 0:
             raise InputError("all points have the same coordinates, so they have no bounding cube")
+        voxel_size = side / resolution
+        if not SMALLEST_VOXEL <= voxel_size <= LARGEST_VOXEL:
+            raise InputError(
+                f"{resolution} voxels over {side:g} m have edges of {voxel_size:.2g} m, which must "
+                f"be {SMALLEST_VOXEL:g} to {LARGEST_VOXEL:g} m",
+                remedy="Check that the coordinates are in metres, and choose another resolution",
+            )
         origin = (low + high - side) / 2
-        return cls(tuple(origin.tolist()), side / resolution, (resolution,) * 3)
+        return cls(tuple(origin.tolist()), voxel_size, (resolution,) * 3)
 
     @classmethod
     def metric(cls, xyz: np.ndarray, voxel_size: float) -> VoxelGrid:

@@ -155,17 +155,21 @@ def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) ->
     """The share of each GENEO in the output of each occupied voxel, coded; empty for a CNN."""
     import torch
 
+    from scenenet.convolution.coarsening import coarsened
     from scenenet.convolution.convolve import convolve_at_voxels
     from scenenet.dataset.batches import batch
     from scenenet.models.geneo_model import GeneoModel
 
     if not isinstance(model, GeneoModel):
         return {}
-    model = model.at(voxels.grid.voxel_size)
-    occupancy, _ = batch([voxels], measurement)
+    size = voxels.grid.voxel_size
+    model = model.at(model.observed_size(size))
+    observed, block = coarsened(
+        batch([voxels], measurement)[0], round(model.observed_size(size) / size)
+    )
     with torch.no_grad():
-        outputs = convolve_at_voxels(occupancy, model.weighted_kernels())
-        parts = outputs[:, model.argmax_rows(occupancy, outputs.sum(dim=0))].numpy()
+        outputs = convolve_at_voxels(observed, model.weighted_kernels())
+        parts = outputs[:, model.argmax_rows(observed, outputs.sum(dim=0))].numpy()[:, block]
     whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
     percent = np.rint(100 * parts / whole).astype("<i1")
     return {name: _coded(row) for name, row in zip(model.names, percent, strict=True)}

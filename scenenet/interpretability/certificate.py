@@ -22,7 +22,8 @@ has the first one. The second one needs a symmetric kernel, which such a model n
 
 
 def certificate(model: str | Path) -> ModelCertificate:
-    """The certificate of a tuned model file, measured at the voxel size of the file.
+    """The certificate of a tuned model file, measured in the voxels that the model observes grids
+    of its training in (``VoxelModel.observed_size``).
 
     A model without GENEOs has the statements of ``OF_CONVOLUTION`` only.
 
@@ -30,7 +31,8 @@ def certificate(model: str | Path) -> ModelCertificate:
         InputError: the file is not a model.
     """
     trained, card = read_model(model)
-    found = certify(trained, voxel_size=card.voxel_size, measurement=card.measurement, tau=card.tau)
+    size = trained.observed_size(card.voxel_size)
+    found = certify(trained, voxel_size=size, measurement=card.measurement, tau=card.tau)
     worst = max((t.mean_h for t in found.turns if t.degrees and t.degrees % 90), default=None)
     values = (
         found.translation_error,
@@ -55,7 +57,7 @@ def certificate(model: str | Path) -> ModelCertificate:
         model=card.name,
         seed=card.provenance.get("seed"),
         kind=found.kind,
-        voxel_size=card.voxel_size,
+        voxel_size=size,
         scene=SCENE,
         half_voxel=found.half_voxel,
         turns=found.turns,

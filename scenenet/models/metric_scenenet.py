@@ -20,7 +20,12 @@ from scenenet.geneo import Lattice, ShapeParameter
 from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.models.geneo_model import GeneoModel
-from scenenet.models.settings import THESIS_GENEOS, KernelSize, MetricSettings
+from scenenet.models.settings import (
+    LARGEST_KERNEL,
+    THESIS_GENEOS,
+    KernelSize,
+    MetricSettings,
+)
 
 COLUMN_M = 2.0
 """Occupied length of a tower's axis, m, at which the observer H is 1. It only sets the scale of H:
@@ -79,6 +84,11 @@ class MetricSceneNet(GeneoModel):
         return 6 * drawn - 3
 
     def at(self, voxel_size: float) -> Self:
+        """The model sampled at voxels of ``voxel_size`` m, sharing the trained numbers.
+
+        Raises:
+            InputError: a kernel would have more than ``LARGEST_KERNEL`` voxels along an edge.
+        """
         if voxel_size == self.voxel_size:
             return self
         other = copy.copy(self)  # shallow: both models share the trained numbers
@@ -90,7 +100,15 @@ class MetricSceneNet(GeneoModel):
         wide = 2 * whole_voxels(self.metric.radius, voxel_size) + 1
         # Centred on the voxel it responds at, so twice the longer side high; ``kernels`` sets the
         # excess of the shorter side to zero.
-        self.kernel_size = (2 * max(up, down) + 1, wide, wide)
+        size = (2 * max(up, down) + 1, wide, wide)
+        if max(size) > LARGEST_KERNEL:
+            raise InputError(
+                f"its kernels would have {'x'.join(map(str, size))} voxels of {voxel_size:g} m, "
+                f"and a kernel has at most {LARGEST_KERNEL} voxels along an edge",
+                remedy="Sample them at the size of the blocks that the model observes "
+                "(observed_size)",
+            )
+        self.kernel_size = size
         self.voxel_size = float(voxel_size)
 
     def observed_size(self, voxel_size: float) -> float:

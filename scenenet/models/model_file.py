@@ -86,7 +86,7 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
         raise InputError(
             f"the model is not written: {error.problem}", file=path, remedy="Train it again"
         ) from None
-    model = model.at(card.voxel_size)
+    model = model.at(model.observed_size(card.voxel_size))
     head = {
         "format": FORMAT,
         "format_version": METRIC_VERSION if model.units == "m" else FORMAT_VERSION,
@@ -184,7 +184,7 @@ def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
     model.set_shape_parameters(numbers | mixing)
     card = _card(data)
     _require_finite(model, card)
-    return model.at(card.voxel_size), card
+    return model.at(model.observed_size(card.voxel_size)), card
 
 
 def _read_cnn(path: Path) -> tuple[CNN, ModelCard]:

@@ -54,6 +54,18 @@ def probabilities(
     return probability, truth
 
 
+def volumes(model: VoxelModel, occupancy: Occupancy, voxel_size: float) -> np.ndarray:
+    """Probability of every voxel of grids in voxels of ``voxel_size`` m, (B, D, H, W) float32."""
+    with torch.no_grad():
+        if not isinstance(model, MetricSceneNet):
+            return model(occupancy).numpy()
+        observed, row = coarsened(occupancy, block_edge(voxel_size))
+        blocks = model.at(model.observed_size(voxel_size))(observed).numpy().reshape(-1)
+    volume = np.zeros((len(occupancy), *occupancy.shape), np.float32)
+    volume.reshape(-1)[occupancy.flat()] = blocks[observed.flat()[row]]
+    return volume
+
+
 @dataclass(frozen=True)
 class PreparedCrop:
     """A crop with everything that does not depend on the parameters of a SCENE-Net in metres, for

@@ -31,6 +31,9 @@ Positive = Annotated[int, Field(ge=1)]
 Edge = Annotated[int, Field(ge=1, le=LARGEST_KERNEL)]
 KernelSize = tuple[Edge, Edge, Edge]
 
+LARGEST_RATE = 1e38
+"""Largest learning rate: float32, in which models are trained, has hardly larger numbers."""
+
 LARGEST_LENGTH = 20.0
 """Largest length of a SCENE-Net in metres, m. It observes voxels of at least 2/3 m (the blocks of
 ``scenenet.convolution.coarsening``), so that its kernels stay within ``LARGEST_KERNEL``."""
@@ -144,7 +147,9 @@ class TrainingSettings(Settings):
     epochs: int = Field(50, ge=1, description="passes over the training set")
     batch_size: int = Field(8, ge=1, description="crops per step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
-    learning_rate: float = Field(0.001, gt=0, le=1e38, description="step size of the optimiser")
+    learning_rate: float = Field(
+        0.001, gt=0, le=LARGEST_RATE, description="step size of the optimiser"
+    )
     decay: float = Field(
         0.0, ge=0, lt=1, description="share by which the learning rate decreases (5.3.4)"
     )

@@ -19,8 +19,7 @@ class TowerModel(PythonModel):
     def load_context(self, context: Any) -> None:
         from scenenet.models.model_file import read_model
 
-        model, card = read_model(context.artifacts["model"])
-        self.model = model.at(card.voxel_size)
+        self.model, self.card = read_model(context.artifacts["model"])
 
     def predict(
         self, context: Any, model_input: np.ndarray, params: dict[str, Any] | None = None
@@ -34,9 +33,8 @@ class TowerModel(PythonModel):
         Returns:
             (B, D, H, W) float32 in [0, 1]; the tower voxels are those of at least the model's tau.
         """
-        import torch
-
         from scenenet.convolution.occupancy import Occupancy
+        from scenenet.models.predictions import volumes
 
         grids = np.asarray(model_input)
         if grids.ndim != 4:
@@ -45,8 +43,8 @@ class TowerModel(PythonModel):
         indices = [np.flatnonzero(grid) for grid in flat]
         values = [grid[index] for grid, index in zip(flat, indices, strict=True)]
         shape = (grids.shape[1], grids.shape[2], grids.shape[3])
-        with torch.no_grad():
-            return self.model(Occupancy.of_grids(indices, values, shape)).numpy()
+        occupancy = Occupancy.of_grids(indices, values, shape)
+        return volumes(self.model, occupancy, self.card.voxel_size)
 
 
 set_model(TowerModel())

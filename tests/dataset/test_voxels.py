@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -60,6 +62,14 @@ def test_the_metric_grid_has_as_many_voxels_as_the_points_need():
     grid = VoxelGrid.metric(np.array([[0, 0, 0], [8, 3, 0.5]]), 2.0)
     assert grid.shape == (1, 2, 4)
     assert grid.origin == (0.0, -0.5, -0.75)
+
+
+@pytest.mark.parametrize(("side", "edge"), [(0.5, "0.0078"), (1e6, "1.6e+04")])
+def test_a_cube_of_voxels_far_from_metres_is_refused(side, edge):
+    """Its model could not be written: a model file has the size of the voxels."""
+    message = f"64 voxels over {side:g} m have edges of {edge} m, which must be 0.01 to 1000 m"
+    with pytest.raises(InputError, match=re.escape(message)):
+        VoxelGrid.cube(np.array([[0.0, 0, 0], [side, 0, 0]]), 64)
 
 
 def test_a_single_point_has_a_metric_grid_but_no_cube():

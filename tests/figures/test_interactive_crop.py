@@ -9,9 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
+from fixtures.scenes import make_scene
 
-from scenenet.figures.interactive_crop import CLASSES, PALETTE, write_scene
+from scenenet.convolution.coarsening import coarsened
+from scenenet.dataset.batches import batch
+from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
+from scenenet.figures.interactive_crop import CLASSES, PALETTE, _shares, write_scene
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.report import page
 from scenenet.results.folder import Results
 
@@ -55,6 +61,20 @@ def test_scores_of_whole_towers_follow_from_their_voxels(scene):
     assert whole.any()
     assert scene["whole_scores"]["precision"] == pytest.approx(tp / (tp + fp))
     assert scene["whole_scores"]["recall"] == pytest.approx(tp / tower.sum())
+
+
+def test_the_shares_in_a_fine_grid_are_those_of_the_blocks_that_the_model_observes():
+    model = MetricSceneNet(generator=torch.Generator().manual_seed(3))
+    cloud = make_scene()
+    fine = voxelise(cloud, VoxelGrid.metric(cloud.xyz, 0.5))
+    blocks, row = coarsened(batch([fine], "presence")[0], 2)
+    ones = np.ones(len(blocks.index), np.int32)
+    grid = VoxelGrid(fine.grid.origin, 1.0, blocks.shape)
+    coarse = VoxelSample("blocks", grid, blocks.index.astype(np.int32), ones, ones > 1)
+    of_blocks, of_voxels = (_shares(model, sample, "presence") for sample in (coarse, fine))
+    for name in ("cylinder", "arrow", "negative_sphere"):
+        expected = decoded(of_blocks[name], "<i1")[row]
+        np.testing.assert_array_equal(decoded(of_voxels[name], "<i1"), expected)
 
 
 def test_the_view_has_no_colours_but_those_of_the_palette():

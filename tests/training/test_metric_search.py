@@ -153,6 +153,20 @@ def test_half_the_voxel_size_covers_the_same_metres():
     torch.testing.assert_close(of_fine[::2, ::2, ::2], sphere / 2)
 
 
+def test_kernels_of_too_many_voxels_are_refused():
+    """The default lengths on voxels of 2 cm: 54 million voxels."""
+    with pytest.raises(InputError, match=r"601x301x301 voxels of 0\.02 m.*at most 64"):
+        MetricSceneNet().at(0.02)
+
+
+def test_a_model_of_fine_grids_has_the_kernels_of_the_blocks_that_it_observes(tmp_path):
+    fine = card_for(net()).model_copy(update={"voxel_size": 0.02})
+    write_model(tmp_path / "m.json", net(5), fine)
+    again, card = read_model(tmp_path / "m.json")
+    assert (card.voxel_size, again.voxel_size, again.kernel_size) == (0.02, 1.0, (7, 5, 5))
+    assert json.loads((tmp_path / "m.json").read_text())["kernel_size"] == [7, 5, 5]
+
+
 def test_a_model_at_another_voxel_size_shares_the_parameters():
     model = net(1)
     fine = model.at(0.5)

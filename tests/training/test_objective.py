@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.geneo import kernel_named
 from scenenet.metrics.threshold_choice import STEPS, best_step
@@ -17,6 +18,7 @@ from scenenet.models.predictions import (
     occupied_probabilities,
     prepare_crops,
     probabilities,
+    volumes,
 )
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings
@@ -111,6 +113,8 @@ def test_prepared_crops_give_the_probabilities_of_the_model(scene, voxel_size):
     with torch.no_grad():
         volume = net.at(1.0)(ready.observed).numpy().reshape(-1)
     np.testing.assert_allclose(volume[ready.observed.index][ready.row], occupied, atol=1e-6)
+    volume = volumes(net, batch([sample], "presence")[0], voxel_size)
+    np.testing.assert_allclose(volume.reshape(-1), probability, atol=1e-6)
     curve = curve_of(net, [ready])
     counts = curve.confusion(100)
     assert counts == confusion(probability, truth, float(np.float32(THRESHOLDS[100])))

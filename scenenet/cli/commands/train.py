@@ -19,6 +19,7 @@ from scenenet.cli.options import (
     cube,
 )
 from scenenet.cli.output import show, training_lines
+from scenenet.models.settings import LARGEST_RATE
 from scenenet.training import presets
 
 EXAMPLES = (
@@ -60,6 +61,7 @@ def command(
         float | None,
         typer.Option(
             min=1e-6,
+            max=LARGEST_RATE,
             help="Step size of RMSProp. Not for an operational SCENE-Net.  [default: "
             f"{presets.LEARNING_RATES['operational']:g} for an operational CNN, "
             f"{presets.LEARNING_RATES['thesis']:g} for protocol thesis]",
@@ -100,7 +102,7 @@ def command(
     try:
         settings = presets.preset(kind.value, protocol.value, epochs, learning_rate)
     except ValueError as error:
-        option = "--learning-rate" if epochs is None else "--epochs"
+        option = "--epochs" if learning_rate is None else "--learning-rate"
         raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None
     if validation is None:
         validation = presets.validation_share(kind.value, protocol.value)

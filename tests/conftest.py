@@ -22,6 +22,10 @@ from fixtures.scenes import PLACE, make_pole_finder, make_scene
 
 from scenenet.pointcloud import PointCloud
 
+# The tests start hundreds of processes, and each would compile the whole package again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
+
 # The same examples each time, so that a test fails because of a change and not because of luck; no
 # deadline, because the first example of some tests waits for a compiler.
 hypothesis.settings.register_profile(

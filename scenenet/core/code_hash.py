@@ -6,21 +6,18 @@ in the package that a script uses, by content, and ignores comments, docstrings 
 
 from __future__ import annotations
 
-import ast
-import hashlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.util import find_spec, resolve_name
 from pathlib import Path
 
-from scenenet.core.errors import InputError
 from scenenet.core.files import digest, sha256
+from scenenet.core.parsed_source import ParsedSource, source_cache
 
 Use = tuple[str, str | None]
 """A module and the name that is used from it; None if the whole module is used."""
 
-_TYPE_CHECKING = frozenset({"TYPE_CHECKING", "typing.TYPE_CHECKING"})
 _COMPILED = frozenset({".py", ".pyc", ".pyo", ".so", ".nbc", ".nbi"})
 
 
@@ -39,7 +36,9 @@ def code_hash(entry_files: Iterable[str | Path], package: str = "scenenet") -> s
     Raises:
         InputError: a file is missing or is not Python.
     """
-    return digest([[name, content] for name, content in sorted(used_code(entry_files, package))])
+    used = sorted(used_code(entry_files, package))
+    source_cache().save()
+    return digest([[name, content] for name, content in used])
 
 
 def used_code(entry_files: Iterable[str | Path], package: str = "scenenet") -> set[tuple[str, str]]:
@@ -143,28 +142,19 @@ def _read(file: Path, name: str | None, package: str) -> _Source:
 
     Cached: a process works with one state of the code, as it does for its imports.
     """
-    try:
-        tree = ast.parse(file.read_bytes(), filename=str(file))
-    except OSError as error:
-        raise InputError(f"cannot be read ({error.strerror})", file=file) from None
-    except SyntaxError as error:
-        place = f"line {error.lineno}"
-        raise InputError(
-            f"the file is not valid Python ({error.msg})", file=file, place=place
-        ) from None
+    parsed = source_cache().read(file)
     is_package = file.name == "__init__.py"
     inside = name if is_package else (name or "").rpartition(".")[0]
-    imports = list(_imports(tree, inside or ""))
+    imports = list(_absolute(parsed, inside or ""))
     tops = {module for _, module, _ in imports}
     uses = {(module, used) for _, module, used in imports if _within(module, package)}
     if name is not None and "pkgutil" in {module.partition(".")[0] for module in tops}:
         uses |= _all_modules(file.parent, inside or "")
-    _strip_docstrings(tree)
     neighbours = [file.with_name(f"{module}.py") for module in sorted(tops)] if name is None else []
     return _Source(
-        hashlib.sha256(ast.unparse(tree).encode()).hexdigest(),
+        parsed.digest,
         tuple(sorted(uses, key=str)),
-        is_package and all(_is_import(statement) for statement in tree.body),
+        is_package and parsed.only_imports,
         {bound: (module, used) for bound, module, used in imports if _within(module, package)},
         tuple(script for script in neighbours if script.is_file()),
     )
@@ -174,77 +164,16 @@ def _within(module: str, package: str) -> bool:
     return module == package or module.startswith(f"{package}.")
 
 
-def _imports(tree: ast.AST, inside: str) -> Iterator[tuple[str, str, str | None]]:
+def _absolute(parsed: ParsedSource, inside: str) -> Iterator[tuple[str, str, str | None]]:
     """(bound name, module, name in the module) of every import that may run.
 
     ``inside`` is the package that relative imports start from.
     """
-    for node in _executed(tree):
-        if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield alias.asname or alias.name, alias.name, None
-        elif isinstance(node, ast.ImportFrom):
-            source = "." * node.level + (node.module or "")
-            if node.level and not inside:
-                continue  # a script has no package; Python would refuse this import too
-            module = resolve_name(source, inside) if node.level else source
-            for alias in node.names:
-                used = None if alias.name == "*" else alias.name
-                yield alias.asname or alias.name, module, used
-
-
-def _executed(node: ast.AST) -> Iterator[ast.AST]:
-    """All statements below ``node`` except the bodies of ``if TYPE_CHECKING``."""
-    for child in _statements(node):
-        if isinstance(child, ast.If) and ast.unparse(child.test) in _TYPE_CHECKING:
-            for statement in child.orelse:
-                yield statement
-                yield from _executed(statement)
-            continue
-        yield child
-        yield from _executed(child)
-
-
-def _statements(node: ast.AST) -> Iterator[ast.AST]:
-    """The statements, handlers and cases directly below ``node``. Expressions contain none, and
-    visiting them would take most of the time."""
-    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
-        children = getattr(node, part, None)
-        if isinstance(children, list):
-            yield from children
-
-
-def _is_import(statement: ast.stmt) -> bool:
-    """Whether a statement of an ``__init__`` only imports names, or lists them in ``__all__``."""
-    if isinstance(statement, ast.Assign):
-        return [ast.unparse(target) for target in statement.targets] == ["__all__"]
-    if isinstance(statement, ast.ImportFrom):
-        return all(alias.name != "*" for alias in statement.names)
-    return isinstance(statement, ast.Pass)
-
-
-def _strip_docstrings(tree: ast.Module) -> None:
-    """Remove strings that are statements of their own: docstrings of modules, classes, functions
-    and attributes."""
-    waiting: list[ast.AST] = [tree]
-    while waiting:
-        node = waiting.pop()
-        for part in ("body", "orelse", "finalbody"):
-            statements = getattr(node, part, None)
-            if isinstance(statements, list):
-                kept = [s for s in statements if not _is_text(s)]
-                # The body of a function must not be empty; other parts may be.
-                empty = [ast.Pass()] if statements and part == "body" else []
-                setattr(node, part, kept or empty)
-        waiting += _statements(node)
-
-
-def _is_text(statement: ast.stmt) -> bool:
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
+    for one in parsed.imports:
+        if one.level and not inside:
+            continue  # a script has no package; Python would refuse this import too
+        source = "." * one.level + one.module
+        yield one.bound, resolve_name(source, inside) if one.level else source, one.name
 
 
 def _all_modules(folder: Path, name: str) -> set[Use]:

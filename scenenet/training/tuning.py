@@ -1,13 +1,12 @@
-"""The choice of tau, kernel size and seed on the validation part (thesis 5.2.4.1, 5.2.7)."""
+"""The choice of tau and kernel size on the validation part (thesis 5.2.4.1, 5.2.7)."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scenenet.core.files import atomic, read_json, write_json
+from scenenet.core.files import write_json
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
 from scenenet.dataset.voxels import Measurement, VoxelSample
@@ -94,18 +93,3 @@ def tuned_tau(
     if not model.tau_from_training:
         return model.best_tau(curve), curve
     return model.best_tau(curve + threshold_curve(model, training, measurement)), curve
-
-
-def champion(
-    models: Sequence[str | Path], tunings: Sequence[str | Path], out_model: str | Path
-) -> dict[str, Any]:
-    """Copy the model with the highest validation F0.5; the first of equals.
-
-    Args:
-        models, tunings: outputs of ``tune``, in the same order.
-    """
-    results = [read_json(path) for path in tunings]
-    best = max(range(len(results)), key=lambda i: results[i]["validation"]["f05"] or 0.0)
-    with atomic(out_model) as partial:
-        shutil.copyfile(models[best], partial)
-    return {"chosen": Path(models[best]).name, "validation": results[best]["validation"]}

@@ -268,6 +268,7 @@ def test_no_stage_depends_on_the_command_line_or_on_the_configuration():
             "scenenet.cli.app",
             "scenenet.config.schema",
             "scenenet.core.code_hash",
+            "scenenet.core.parsed_source",
         }
 
 

@@ -15,7 +15,8 @@ from scenenet.models.model_file import read_model, write_model
 from scenenet.models.predictions import probabilities
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import TuningSettings
-from scenenet.training.tuning import champion, choose, tune
+from scenenet.training.champion import champion
+from scenenet.training.tuning import choose, tune
 
 
 @pytest.fixture(scope="module")

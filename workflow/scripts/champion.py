@@ -4,7 +4,7 @@ import _job
 
 
 def champion(job: _job.Job) -> None:
-    from scenenet.training.tuning import champion
+    from scenenet.training.champion import champion
 
     champion(job.input.models, job.input.tunings, job.output.model)
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
 import typer
 
 from scenenet.core.errors import InputError
 
+Input = TypeVar("Input")
 Seen = TypeVar("Seen")
 
 
@@ -29,12 +29,12 @@ class Failures:
         except InputError as error:
             self.errors.append(error)
 
-    def look_at(self, paths: Sequence[Path], look: Callable[[Path], Seen]) -> dict[Path, Seen]:
-        """What ``look`` returns for each path, without those for which it raises InputError."""
+    def look_at(self, inputs: Iterable[Input], look: Callable[[Input], Seen]) -> dict[Input, Seen]:
+        """What ``look`` returns for each input, without those for which it raises InputError."""
         seen = {}
-        for path in paths:
+        for each in inputs:
             with self.collect():
-                seen[path] = look(path)
+                seen[each] = look(each)
         return seen
 
     def end(self) -> None:

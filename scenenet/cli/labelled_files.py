@@ -2,36 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
-import pandas as pd
 
 from scenenet.cli.inputs import Failures
 from scenenet.core.errors import InputError, in_file, warn
 from scenenet.core.scratch import scratch_folder
 from scenenet.core.unchanged import unchanged
-from scenenet.dataset.crops import CropSettings, cut_crops
-from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
+from scenenet.dataset.crops import Crop, CropSettings, Truth, crop_of, cut_crops
+from scenenet.dataset.labelled_towers import LabelledTowers, TowerSettings, survey_towers
 from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.voxel_cache import Dataset, build, load
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import detect_in_crop, match_crop
-from scenenet.evaluation.result import TowerScores
+from scenenet.evaluation.result import Evaluation, PointScores, TowerScores
 from scenenet.evaluation.scoring import score
-from scenenet.metrics.tower_matching import TowerMatch, match_towers
+from scenenet.evaluation.surveys import LabelledSurvey, SurveyScores, score_survey
 from scenenet.models.model_file import read_model, write_model
-from scenenet.models.predictions import probabilities
 from scenenet.models.settings import ModelSettings, TuningSettings
 from scenenet.pointcloud import survey_in_metres
 from scenenet.pointcloud.quality.screening import survey_warnings
+from scenenet.pointcloud.reading import same_points
 from scenenet.pointcloud.ts40k import sample_files
-from scenenet.prediction.predict import predict_survey
-from scenenet.prediction.settings import PredictSettings
 from scenenet.training.train import card_of, fit
 from scenenet.training.tuning import choose
 
@@ -43,8 +37,7 @@ class LabelledFiles:
     Attributes:
         dataset: their crops on grids.
         parts: part of each crop by its id; empty without a split or with a single crop.
-        surveys: table of labelled towers of each survey, TS40K samples excluded.
-        survey_crops: ids of the crops that were cut from surveys.
+        surveys: the surveys and TS40K samples, those without a crop included.
         read: the files that could be read.
         skipped: files or samples without a crop, and labelled points that are no tower, with the
             reason.
@@ -53,8 +46,7 @@ class LabelledFiles:
 
     dataset: Dataset = field(default_factory=lambda: Dataset([], [], "", []))
     parts: dict[str, str] = field(default_factory=dict)
-    surveys: dict[Path, pd.DataFrame] = field(default_factory=dict)
-    survey_crops: set[str] = field(default_factory=set)
+    surveys: list[LabelledSurvey] = field(default_factory=list)
     read: list[Path] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -66,6 +58,7 @@ def read_labelled(
     grid: VoxelSettings,
     failures: Failures,
     split: SplitSettings | None = None,
+    truths: Sequence[Path] = (),
 ) -> LabelledFiles:
     """Cut crops around the labelled towers of files, and voxelise them.
 
@@ -74,19 +67,25 @@ def read_labelled(
         codes: class scheme of the labels.
         failures: gets the errors of the files that cannot be read; the others are read.
         split: the shares of the split; a single crop is not split.
+        truths: for each of ``paths`` a file with the same points in the same order, with the true
+            classes, or a folder of such samples; empty where the truth is not known.
     """
     files = LabelledFiles()
-    seen = failures.look_at(paths, _look)
+    pairs: list[tuple[Path, Path | None]] = [
+        (path, truths[number] if truths else None) for number, path in enumerate(paths)
+    ]
+    seen = failures.look_at(dict.fromkeys(pairs), _look)
     with scratch_folder() as scratch:
         manifests: list[tuple[Path, Path]] = []
-        for number, path in enumerate(paths, start=1):
-            if path not in seen:
+        for number, (path, truth) in enumerate(pairs, start=1):
+            if (path, truth) not in seen:
                 continue
             # The number keeps files of the same name in different folders apart.
             name = path.stem if len(paths) == 1 else f"{number}-{path.stem}"
-            with failures.collect(), unchanged(path), in_file(path):
+            used = [path] if truth is None else [path, truth]
+            with failures.collect(), unchanged(*used), in_file(path):
                 folder = scratch / f"{number}"
-                manifests.append(_read_file(path, name, codes, grid, folder, files))
+                manifests.append(_read_file(path, truth, name, codes, grid, folder, files))
         dataset = load([voxels for _, voxels in manifests])
         parts = {}
         if split is not None and len(dataset.samples) > 1:
@@ -95,18 +94,30 @@ def read_labelled(
     return replace(files, dataset=dataset, parts=parts)
 
 
-def _look(path: Path) -> None:
-    """Look at the header and the unit of a survey, or for the files of samples.
+def _look(pair: tuple[Path, Path | None]) -> None:
+    """Look at the headers and the unit of a survey and its truth, or for the files of samples.
 
     Raises:
-        InputError: the file cannot be used.
+        InputError: a file cannot be used.
     """
+    path, truth = pair
+    if truth is not None and path.is_dir() != truth.is_dir():
+        kinds = ("a file", "a folder") if truth.is_dir() else ("a folder", "a file")
+        raise InputError(f"the truth of {kinds[0]} cannot be {kinds[1]}", file=truth)
     if not sample_files(path):
         survey_in_metres(path)
+    if truth is not None and not path.is_dir():
+        same_points(path, truth)
 
 
 def _read_file(
-    path: Path, name: str, codes: str, grid: VoxelSettings, folder: Path, files: LabelledFiles
+    path: Path,
+    truth: Path | None,
+    name: str,
+    codes: str,
+    grid: VoxelSettings,
+    folder: Path,
+    files: LabelledFiles,
 ) -> tuple[Path, Path]:
     """Add what a file holds to ``files``.
 
@@ -119,20 +130,47 @@ def _read_file(
     files.warnings.extend(f"{path}: {text}" for text in warnings)
     files.skipped.extend({"sample": path.name, "reason": note} for note in found.notes())
     crops, voxels = folder / "crops.json", folder / "voxels.json"
+    standing = None
+    if truth is not None:
+        true = survey_towers(truth, codes, TowerSettings())
+        files.skipped.extend(
+            {"sample": path.name, "reason": f"in the truth, {note}"} for note in true.notes()
+        )
+        standing = Truth(truth, true.towers)
     facts = cut_crops(
-        name, path, codes, found.towers, CropSettings(), folder / "crops.zarr.zip", crops
+        name, path, codes, found.towers, CropSettings(), folder / "crops.zarr.zip", crops, standing
     )
     build(crops, grid, folder / "voxels.zarr.zip", voxels)
     files.read.append(path)
     files.skipped.extend(facts["skipped"])
-    if not sample_files(path):
-        files.surveys[path] = found.towers
-        files.survey_crops.update(entry["id"] for entry in facts["crops"])
-        if len(found.towers) == 0:
-            labelled = int(found.left_out["points"].sum())
-            reason = f"no tower among its {labelled} points labelled tower"
-            files.skipped.append({"sample": path.name, "reason": reason})
+    cut = [crop_of(entry) for entry in facts["crops"]]
+    files.surveys.extend(_surveys(path, name, codes, found, standing, cut))
+    if not sample_files(path) and len(found.towers) == 0:
+        labelled = int(found.left_out["points"].sum())
+        reason = f"no tower among its {labelled} points labelled tower"
+        files.skipped.append({"sample": path.name, "reason": reason})
     return crops, voxels
+
+
+def _surveys(
+    path: Path,
+    name: str,
+    codes: str,
+    found: LabelledTowers,
+    truth: Truth | None,
+    crops: Sequence[Crop],
+) -> Iterator[LabelledSurvey]:
+    """The survey at ``path``, or each of its TS40K samples."""
+    samples = sample_files(path)
+    if not samples:
+        of_truth = () if truth is None else (truth.path, truth.towers)
+        yield LabelledSurvey(path, codes, found.towers, tuple(crops), False, *of_truth)
+    for sample in samples:
+        towers = found.towers[found.towers["sample"] == sample.stem]
+        own = tuple(crop for crop in crops if crop.id == f"{name}-{sample.stem}")
+        true = None if truth is None else truth.of_sample(sample)
+        of_truth = () if truth is None or true is None else (true, truth.towers_in(true))
+        yield LabelledSurvey(sample, codes, towers, own, True, *of_truth)
 
 
 def train_files(
@@ -204,13 +242,18 @@ def evaluate_files(
     grid: VoxelSettings | None,
     detection: DetectionSettings,
     failures: Failures,
+    truths: Sequence[Path] = (),
 ) -> dict[str, Any]:
-    """Scores of a model on labelled files.
+    """Scores of a model on labelled files, against their labels and against the truth.
+
+    Points are scored by the answer that ``scenenet predict`` gives for each file, whatever the
+    grid.
 
     Args:
         grid: the grid for the voxel scores; None for the model's own voxel size. With None, towers
             are detected in whole surveys instead of crops around the labelled towers, so that
             false towers everywhere count, also in surveys without towers.
+        truths: as in ``read_labelled``.
 
     Returns:
         the evaluation as plain values, with ``skipped`` and ``warnings``.
@@ -222,31 +265,37 @@ def evaluate_files(
     trained, card = read_model(model)
     whole_surveys = grid is None
     grid = grid or VoxelSettings(fit="metric", voxel_size=card.voxel_size)
-    files = read_labelled(paths, codes, grid, failures)
+    files = read_labelled(paths, codes, grid, failures, truths=truths)
     if not (whole_surveys and files.surveys):
         _require_crops(files, paths, failures)
-    result = score(trained, card, files.dataset, detection)
-    if whole_surveys:
-        match = TowerMatch(np.empty(0), 0, 0)
-        for sample, crop in zip(files.dataset.samples, files.dataset.crops, strict=True):
-            if sample.id not in files.survey_crops:
-                probability, _ = probabilities(trained, sample, card.measurement)
-                found = detect_in_crop(sample, probability, card.threshold(), detection)
-                match += match_crop(found.towers, crop)
-        for survey, towers in files.surveys.items():
-            with failures.collect():
-                match += _survey_towers(survey, towers, model, detection)
-        result = replace(result, towers=TowerScores.of(match))
+    found = SurveyScores()
+    for survey in files.surveys:
+        with failures.collect():
+            found += score_survey(survey, model, detection)
+    result = score(trained, card, files.dataset, detection, found.by_crop)
+    result = _of_whole_files(result, found, towers=whole_surveys)
     return result.to_json() | {"skipped": files.skipped, "warnings": files.warnings}
 
 
-def _survey_towers(
-    survey: Path, towers: pd.DataFrame, model: str | Path, detection: DetectionSettings
-) -> TowerMatch:
-    """Match the towers detected in a whole survey with its labelled towers."""
-    with predict_survey(survey, model, PredictSettings(), detection) as prediction:
-        found = np.array([[tower.x, tower.y] for tower in prediction.towers])
-    return match_towers(found, towers[["x", "y"]].to_numpy(float))
+def _of_whole_files(result: Evaluation, found: SurveyScores, *, towers: bool) -> Evaluation:
+    """The scores of crops with the points of whole files instead, and with their towers if asked.
+
+    Without a crop there is nothing to count in voxels, neither for the labels nor for the truth.
+    """
+    true = found.points.truth
+    truth = None if true is None else result.truth or result.labels
+    if truth is not None and true is not None:
+        truth = replace(truth, points=PointScores.of(true))
+        if towers and found.true_towers is not None:
+            truth = replace(truth, towers=TowerScores.of(found.true_towers))
+    of_labels = found.points.labels_against_truth
+    return replace(
+        result,
+        points=PointScores.of(found.points.labels),
+        towers=TowerScores.of(found.towers) if towers else result.towers,
+        truth=truth,
+        labels_against_truth=None if of_labels is None else PointScores.of(of_labels),
+    )
 
 
 def _require_crops(files: LabelledFiles, paths: Sequence[Path], failures: Failures) -> None:

@@ -28,22 +28,54 @@ def training_lines(result: dict[str, Any]) -> list[str]:
 
 
 def score_lines(result: dict[str, Any]) -> list[str]:
+    """The scores against the truth, where it is known, and those against the labels."""
+    truth, of_labels = result["truth"], result["labels_against_truth"]
+    if truth is None:
+        return _scores(result, result["model"], "labelled")
+    return [
+        "against the truth",
+        *_scores(truth, result["model"], "true"),
+        "the labels themselves: " + _points(of_labels, "labelled tower", "true"),
+        "",
+        "against the labels",
+        *_scores(result, result["model"], "labelled"),
+    ]
+
+
+def _scores(result: dict[str, Any], model: str, kind: str) -> list[str]:
     def row(name: str, scores: dict[str, float | None]) -> str:
         values = [scores[column.name] for column in SCORE_COLUMNS]
         cells = ["-" if value is None else f"{value:.3f}" for value in values]
         return f"{name:<24}" + "".join(f"{cell:>10}" for cell in cells)
 
     towers = result["towers"]
-    error = towers["median_error_m"]
+    errors = [
+        f", median {what} error {towers[name]:.2f} m"
+        for what, name in (
+            ("position", "median_error_m"),
+            ("height", "median_height_error_m"),
+            ("base", "median_base_error_m"),
+        )
+        if towers[name] is not None
+    ]
     return [
         f"{'':<24}" + "".join(f"{column.label:>10}" for column in SCORE_COLUMNS),
-        row(result["model"], result["voxel"]),
+        row(model, result["voxel"]),
         row("  occupied voxels only", result["voxel_occupied"]),
         row("  voxels at or above tau", result["voxel_observer"]),
         row("  whole towers", result["voxel_towers"]),
         row("predicting nothing", result["voxel_trivial"]),
         f"{result['voxel']['n_samples']} crops, tau {result['voxel']['tau']:.3f}",
-        f"towers: {towers['n_predicted']} found, {towers['n_true']} true, "
+        f"towers: {towers['n_predicted']} found, {towers['n_true']} {kind}, "
         f"precision {score_text(towers['precision'])}, recall {score_text(towers['recall'])}"
-        + ("" if error is None else f", median position error {error:.2f} m"),
+        + "".join(errors),
+        "points: " + _points(result["points"], "with a tower id", kind),
     ]
+
+
+def _points(points: dict[str, Any], predicted: str, kind: str) -> str:
+    return (
+        f"{points['n_predicted']:,} {predicted}, {points['n_true']:,} {kind} tower points, "
+        f"precision {score_text(points['precision'])}, recall {score_text(points['recall'])}, "
+        f"IoU {score_text(points['iou'])}"
+    )

@@ -14,13 +14,14 @@ from pydantic import Field
 from scenenet.core.progress import track
 from scenenet.core.scratch import scratch_folder
 from scenenet.core.settings import Settings
+from scenenet.dataset.tower_places import TowerPlaces
 from scenenet.dataset.zarr_store import StoreReader, create
 from scenenet.pointcloud import iter_chunks, read
 from scenenet.pointcloud.class_schemes import class_scheme
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.ts40k import sample_files
 
-_RECORD = np.dtype([("xyz", "<f8", 3), ("classification", "u1")])
+_RECORD = np.dtype([("xyz", "<f8", 3), ("classification", "u1"), ("truth", "u1")])
 
 
 class CropSettings(Settings):
@@ -39,7 +40,9 @@ class Crop:
         id: unique name, SURVEY-NUMBER or SURVEY-SAMPLE.
         x, y: centre of its tower, m.
         radius: planar radius, m.
-        towers: (T, 2) x and y of the centres of all labelled towers in the crop, m.
+        towers: (T, 4) of all labelled towers in the crop, m: x and y of the centre, elevation of
+            the ground under it and height above it, both NaN without ground points there.
+        true_towers: the same of all true towers in the crop; None where the truth is not known.
     """
 
     id: str
@@ -47,6 +50,30 @@ class Crop:
     y: float
     radius: float
     towers: np.ndarray
+    true_towers: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The truth of a labelled survey.
+
+    Attributes:
+        path: a file with the same points in the same order, with the true classes.
+        towers: table of ``labelled_towers.survey_towers`` of this file.
+    """
+
+    path: Path
+    towers: pd.DataFrame
+
+    def of_sample(self, sample: Path) -> Path:
+        """The file with the truth of a TS40K sample: the sample of the same name in a folder."""
+        return self.path / sample.name if self.path.is_dir() else self.path
+
+    def towers_in(self, sample: Path) -> pd.DataFrame:
+        """The rows of ``towers`` of the file ``sample``, which is that of a TS40K sample."""
+        if "sample" not in self.towers:  # the truth of the sample is a survey
+            return self.towers
+        return self.towers[self.towers["sample"] == sample.stem]
 
 
 def cut_crops(
@@ -57,6 +84,7 @@ def cut_crops(
     settings: CropSettings,
     store: str | Path,
     manifest: str | Path,
+    truth: Truth | None = None,
 ) -> dict[str, Any]:
     """Write every point within one tower height (planar) of each tower.
 
@@ -71,21 +99,27 @@ def cut_crops(
         settings: size of a crop.
         store: path of the ``.zarr.zip`` file to write.
         manifest: path of the JSON file to write, in the same folder.
+        truth: the truth of the survey; None where it is not known. A folder of samples has a
+            folder with samples of the same names as its truth.
 
     Returns:
         the manifest: ``crops`` has an entry for each crop; ``skipped`` lists the samples that were
         left out, with the reason.
+
+    Raises:
+        InputError: the points of the truth are not those of the survey.
     """
     facts: dict[str, Any] = {"survey": survey, "codes": codes, "crops": [], "skipped": []}
     samples = sample_files(path)
     clouds = (
-        _samples(survey, samples, codes, towers, settings, facts["skipped"])
+        _samples(survey, samples, codes, towers, settings, facts["skipped"], truth)
         if samples
-        else _cut(survey, path, codes, towers, settings)
+        else _cut(survey, path, codes, towers, settings, truth)
     )
     with create(store, manifest, facts) as writer:
         for crop, cloud in clouds:
-            writer.add(crop.id, {"xyz": cloud.xyz, "classification": cloud.classification})
+            arrays = {"xyz": cloud.xyz, "classification": cloud.classification}
+            writer.add(crop.id, arrays | ({} if cloud.truth is None else {"truth": cloud.truth}))
             facts["crops"].append(_entry(crop, len(cloud)))
     return facts
 
@@ -96,14 +130,18 @@ def read_crops(manifest: str | Path) -> Iterator[tuple[Crop, PointCloud]]:
     scheme = class_scheme(reader.manifest["codes"])
     for entry in reader.manifest["crops"]:
         arrays = reader.get(entry["id"])
-        cloud = PointCloud(arrays["xyz"], arrays["classification"], scheme)
+        cloud = PointCloud(
+            arrays["xyz"], arrays["classification"], scheme, truth=arrays.get("truth")
+        )
         yield crop_of(entry), cloud
 
 
 def crop_of(entry: dict[str, Any]) -> Crop:
     """The crop that an entry of a manifest describes."""
-    towers = np.asarray(entry["towers"], float).reshape(-1, 2)
-    return Crop(entry["id"], entry["x"], entry["y"], entry["radius"], towers)
+    towers = np.asarray(entry["towers"], float).reshape(-1, 4)
+    true = entry.get("true_towers")
+    true_towers = None if true is None else np.asarray(true, float).reshape(-1, 4)
+    return Crop(entry["id"], entry["x"], entry["y"], entry["radius"], towers, true_towers)
 
 
 def _entry(crop: Crop, points: int) -> dict[str, Any]:
@@ -112,13 +150,24 @@ def _entry(crop: Crop, points: int) -> dict[str, Any]:
         "x": crop.x,
         "y": crop.y,
         "radius": crop.radius,
-        "towers": crop.towers.tolist(),
+        "towers": _plain(crop.towers),
+        "true_towers": None if crop.true_towers is None else _plain(crop.true_towers),
         "points": points,
     }
 
 
+def _plain(towers: np.ndarray) -> list[list[float | None]]:
+    """Numbers as JSON holds them, in which NaN is null."""
+    return [[None if np.isnan(value) else value for value in row] for row in towers.tolist()]
+
+
 def _cut(
-    survey: str, path: str | Path, codes: str, towers: pd.DataFrame, settings: CropSettings
+    survey: str,
+    path: str | Path,
+    codes: str,
+    towers: pd.DataFrame,
+    settings: CropSettings,
+    truth: Truth | None,
 ) -> Iterator[tuple[Crop, PointCloud]]:
     centres = towers[["x", "y"]].to_numpy(float)
     radii = towers["height"].to_numpy(float) * settings.radius_in_heights
@@ -127,18 +176,45 @@ def _cut(
         spools = [folder / f"{number}" for number in towers["tower"]]
         for spool in spools:
             spool.touch()
-        for chunk in track(iter_chunks(path, codes), f"{survey}: chunks read"):
+        chunks = iter_chunks(path, codes, truth=None if truth is None else truth.path)
+        for chunk in track(chunks, f"{survey}: chunks read"):
             for centre, radius, spool in zip(centres, radii, spools, strict=True):
                 _append(spool, chunk, centre, radius)
         for number, centre, radius, spool in zip(
             towers["tower"], centres, radii, spools, strict=True
         ):
             records = np.fromfile(spool, _RECORD)
-            inside = np.linalg.norm(centres - centre, axis=1) <= radius
-            x, y = centre.tolist()
-            crop = Crop(f"{survey}-{number:04d}", x, y, float(radius), centres[inside])
-            xyz = np.ascontiguousarray(records["xyz"])
-            yield crop, PointCloud(xyz, records["classification"].copy(), scheme)
+            cloud = PointCloud(
+                np.ascontiguousarray(records["xyz"]),
+                records["classification"].copy(),
+                scheme,
+                truth=None if truth is None else records["truth"].copy(),
+            )
+            near = [
+                _within(table, centre, radius)
+                for table in (towers, *(() if truth is None else (truth.towers,)))
+            ]
+            name, (x, y) = f"{survey}-{number:04d}", centre.tolist()
+            yield Crop(name, x, y, float(radius), *_places(cloud, *near)), cloud
+
+
+def _within(towers: pd.DataFrame, centre: np.ndarray, radius: float) -> pd.DataFrame:
+    """The rows of a table of towers within a planar distance in m of a place (2,)."""
+    apart = np.linalg.norm(towers[["x", "y"]].to_numpy(float) - centre, axis=1)
+    return towers[apart <= radius]
+
+
+def _places(
+    cloud: PointCloud, labelled: pd.DataFrame, true: pd.DataFrame | None = None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """``Crop.towers`` and ``Crop.true_towers`` of a crop with these points and towers."""
+    towers, true_towers = TowerPlaces(labelled), None
+    towers.add(cloud)
+    if true is not None and (points := cloud.with_truth) is not None:
+        found = TowerPlaces(true)
+        found.add(points)
+        true_towers = found.places()
+    return towers.places(), true_towers
 
 
 def _append(spool: Path, chunk: PointCloud, centre: np.ndarray, radius: float) -> None:
@@ -152,6 +228,7 @@ def _append(spool: Path, chunk: PointCloud, centre: np.ndarray, radius: float) -
     records = np.empty(len(near), _RECORD)
     records["xyz"] = chunk.xyz[near]
     records["classification"] = chunk.classification[near]
+    records["truth"] = 0 if chunk.truth is None else chunk.truth[near]
     with spool.open("ab") as stream:
         stream.write(records.tobytes())
 
@@ -163,14 +240,17 @@ def _samples(
     towers: pd.DataFrame,
     settings: CropSettings,
     skipped: list[dict[str, str]],
+    truth: Truth | None,
 ) -> Iterator[tuple[Crop, PointCloud]]:
     for sample in track(samples, f"{survey}: samples"):
-        cloud = read(sample, codes)
+        true = None if truth is None else truth.of_sample(sample)
+        cloud = read(sample, codes, true)
         found = towers[towers["sample"] == sample.stem]
         if len(found) == 0:
             skipped.append({"sample": sample.name, "reason": "it has no labelled tower"})
             continue
         main = found.loc[found["points"].idxmax()]
         radius = float(main["height"]) * settings.radius_in_heights
-        centres = found[["x", "y"]].to_numpy(float)
-        yield Crop(f"{survey}-{sample.stem}", main["x"], main["y"], radius, centres), cloud
+        standing = None if truth is None or true is None else truth.towers_in(true)
+        places = _places(cloud, found, standing)
+        yield Crop(f"{survey}-{sample.stem}", main["x"], main["y"], radius, *places), cloud

@@ -46,6 +46,8 @@ def build(
                 sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id)
             seconds = time.perf_counter() - begin
             arrays = {"index": sample.index, "count": sample.count, "tower": sample.tower}
+            if sample.true is not None:
+                arrays["true"] = sample.true
             writer.add(crop.id, arrays)
             facts["samples"].append(
                 entries[crop.id]

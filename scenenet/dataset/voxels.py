@@ -136,7 +136,9 @@ class VoxelSample:
         grid: where the voxels lie.
         index: (M,) int32, flat C-order [z, y, x] positions of the occupied voxels, ascending.
         count: (M,) int32, number of points in each.
-        tower: (M,) bool, whether any of its points is labelled tower: the ground truth.
+        tower: (M,) bool, whether any of its points is labelled tower: what a model learns.
+        true: (M,) bool, whether any of its points is tower in truth; None where the truth is not
+            known.
     """
 
     id: str
@@ -144,6 +146,7 @@ class VoxelSample:
     index: np.ndarray
     count: np.ndarray
     tower: np.ndarray
+    true: np.ndarray | None = None
 
     def phi(self, measurement: Measurement) -> np.ndarray:
         """The measurement at the occupied voxels, (M,) float32 in [0, 1] (thesis 4.2.2, 5.3.2).
@@ -159,9 +162,17 @@ class VoxelSample:
         probability (M,) of the occupied ones; empty voxels have 0."""
         probability = np.zeros(self.grid.n_voxels, np.float32)
         probability[self.index] = occupied
-        truth = np.zeros(self.grid.n_voxels, bool)
-        truth[self.tower_index()] = True
-        return probability, truth
+        labelled = np.zeros(self.grid.n_voxels, bool)
+        labelled[self.tower_index()] = True
+        return probability, labelled
+
+    def truth(self) -> np.ndarray | None:
+        """(V,) bool: the voxels of the grid that are tower in truth; None where it is not known."""
+        if self.true is None:
+            return None
+        true = np.zeros(self.grid.n_voxels, bool)
+        true[self.index[self.true]] = True
+        return true
 
     def tower_index(self) -> np.ndarray:
         """(T,) flat positions of the tower voxels."""
@@ -169,15 +180,20 @@ class VoxelSample:
 
 
 def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSample:
-    """Count points and tower points in each voxel of ``grid``.
+    """Count points and tower points in each voxel of ``grid``, true tower points too if known.
 
     Raises:
         InputError: the class scheme of the cloud is not known.
     """
     from scenenet.dataset.voxel_counts import tally
 
-    index, count, tower = tally(grid.voxel_of(cloud.xyz), cloud.is_tower, grid.n_voxels)
-    return VoxelSample(sample_id, grid, index, count, tower)
+    voxel = grid.voxel_of(cloud.xyz)
+    index, count, tower = tally(voxel, cloud.is_tower, grid.n_voxels)
+    true = None
+    if (is_true := cloud.is_true_tower) is not None:
+        true = np.zeros(len(index), bool)
+        true[np.searchsorted(index, voxel[is_true])] = True
+    return VoxelSample(sample_id, grid, index, count, tower, true)
 
 
 def _bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

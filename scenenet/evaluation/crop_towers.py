@@ -1,4 +1,4 @@
-"""Detection of towers in a crop, and matching with the labelled towers."""
+"""Detection of towers in a crop, and matching with the labelled or true towers."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 
 from scenenet.convolution.coarsening import block_edge, coarsened
 from scenenet.convolution.occupancy import Occupancy
-from scenenet.dataset.crops import Crop
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample
 from scenenet.detection.detect import DetectedTower, body_voxels, detect_towers, surroundings_in
 from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.survey_tower import SurveyTower
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 
 
@@ -62,6 +62,12 @@ def detect_in_crop(
     return CropDetection(towers, of_a_tower)
 
 
-def match_crop(towers: Sequence[DetectedTower], crop: Crop) -> TowerMatch:
-    """Match the detected towers of a crop with its labelled towers."""
-    return match_towers(np.array([[tower.x, tower.y] for tower in towers]), crop.towers)
+def match_crop(towers: Sequence[DetectedTower], true: np.ndarray) -> TowerMatch:
+    """Match the detected towers of a crop with its labelled or true ones (T, 4), as in ``Crop``."""
+    return match_towers(places_of(towers), true)
+
+
+def places_of(towers: Sequence[DetectedTower | SurveyTower]) -> np.ndarray:
+    """(P, 4) m: x, y, elevation of the base, and height of each tower."""
+    places = [[tower.x, tower.y, tower.base, tower.height] for tower in towers]
+    return np.array(places, float).reshape(-1, 4)

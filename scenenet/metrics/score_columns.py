@@ -179,7 +179,7 @@ def score_column(name: str) -> ScoreColumn:
 
 @dataclass(frozen=True)
 class MatchColumn:
-    """One number of the comparison of predicted with labelled tower positions.
+    """One number of the comparison of predicted with labelled or true towers or points.
 
     Attributes:
         name: column in CSV files, key in JSON files, and metric in MLflow.
@@ -198,12 +198,25 @@ MATCH_COLUMNS = (
     MatchColumn("precision", "precision", "1", "score2"),
     MatchColumn("recall", "recall", "1", "score2"),
     MatchColumn("median_error_m", "median position error [m]", "m", "metres"),
+    MatchColumn("median_height_error_m", "median height error [m]", "m", "metres"),
+    MatchColumn("median_base_error_m", "median base error [m]", "m", "metres"),
     MatchColumn("n_true", "labelled towers", "1", "count"),
     MatchColumn("n_predicted", "predicted towers", "1", "number"),
 )
 """``scenenet.metrics.tower_matching.TowerMatch.scores``, in the order of the tables."""
 
 MATCH_SCORES = tuple(column.name for column in MATCH_COLUMNS)
+
+POINT_COLUMNS = (
+    MatchColumn("precision", "precision", "1", "score2"),
+    MatchColumn("recall", "recall", "1", "score2"),
+    MatchColumn("iou", "IoU", "1", "score2"),
+    MatchColumn("n_true", "tower points", "1", "count"),
+    MatchColumn("n_predicted", "points with a tower id", "1", "number"),
+)
+"""``scenenet.evaluation.result.PointScores``: points with a tower id against tower points."""
+
+POINT_SCORES = tuple(column.name for column in POINT_COLUMNS)
 
 AT_TAU = "at or above tau"
 """Voxels count as detected if their probability is at or above tau, as in the thesis."""

@@ -1,4 +1,4 @@
-"""Counts of predicted against labelled voxels (thesis 5.2.4.1)."""
+"""Counts of predicted against labelled voxels or points (thesis 5.2.4.1)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scenenet.metrics.score_columns import SCORE_COLUMNS
 
 @dataclass(frozen=True)
 class Confusion:
-    """Counts of voxels, predicted against labelled.
+    """Counts of voxels or points, predicted against labelled.
 
     Counts of several samples add up, so that a score is taken over all their voxels together.
     """
@@ -61,6 +61,15 @@ class Confusion:
     def scores(self) -> dict[str, float | None]:
         """Every score of ``scenenet.metrics.score_columns`` by its name; None if not defined."""
         return {column.name: column.compute(self) for column in SCORE_COLUMNS}
+
+    @classmethod
+    def of(cls, predicted: np.ndarray, true: np.ndarray) -> Confusion:
+        """Compare two masks (N,) bool."""
+        tp, n_predicted, n_true = (
+            int(np.count_nonzero(each)) for each in (predicted & true, predicted, true)
+        )
+        fp, fn = n_predicted - tp, n_true - tp
+        return cls(tp, fp, fn, len(true) - tp - fp - fn)
 
     def without_predictions(self) -> Confusion:
         """The trivial baseline on the same voxels: a model that never predicts tower."""

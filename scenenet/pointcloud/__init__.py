@@ -3,6 +3,7 @@
 - ``cloud``: the point cloud that every stage works with.
 - ``class_schemes``: what class codes mean.
 - ``reading``: surveys of any format, whole or in chunks.
+- ``true_classes``: true classes from a second file with the same points.
 - ``file_kinds``: the kind of a file, from its content and suffix.
 - ``las``: LAS, LAZ and COPC files.
 - ``ts40k``: samples of the TS40K dataset.

@@ -135,6 +135,11 @@ class ClassScheme:
         """(N,) bool: the points labelled tower, from their class codes (N,)."""
         return np.isin(classification, list(self.tower))
 
+    def is_ground(self, classification: np.ndarray) -> np.ndarray:
+        """(N,) bool: the points that look like bare ground, from their class codes (N,)."""
+        ground = [entry.code for entry in self.codes if entry.drawn_look == "ground"]
+        return np.isin(classification, ground)
+
     def roles(self, classification: np.ndarray) -> np.ndarray:
         """(N,) keys of ``ROLE_COLOURS``, from class codes (N,) uint8."""
         return _lookup({c.code: c.drawn_role for c in self.codes}, classification)

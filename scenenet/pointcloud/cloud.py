@@ -24,12 +24,15 @@ class PointCloud:
         classification: (N,) uint8 class codes.
         scheme: what the codes mean; None if the user did not name it (it is never guessed).
         crs: coordinate reference system; None if the file names none.
+        truth: (N,) uint8 true class codes, where a second file has them; else None.
+            ``classification`` are then the labels, which may differ.
     """
 
     xyz: np.ndarray
     classification: np.ndarray
     scheme: ClassScheme | None = None
     crs: pyproj.CRS | None = None
+    truth: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         xyz, codes = np.asarray(self.xyz), np.asarray(self.classification)
@@ -38,6 +41,12 @@ class PointCloud:
         if codes.shape != (len(xyz),) or codes.dtype != np.uint8:
             raise ValueError(
                 f"classification must be ({len(xyz)},) uint8, not {codes.shape} {codes.dtype}"
+            )
+        if self.truth is not None and (
+            self.truth.shape != codes.shape or self.truth.dtype != np.uint8
+        ):
+            raise ValueError(
+                f"truth must be ({len(xyz)},) uint8, not {self.truth.shape} {self.truth.dtype}"
             )
 
     def __len__(self) -> int:
@@ -51,6 +60,29 @@ class PointCloud:
             InputError: the class scheme is not known.
         """
         return self._known_scheme().is_tower(self.classification)
+
+    @property
+    def is_true_tower(self) -> np.ndarray | None:
+        """(N,) bool: points that are tower in truth; None where the truth is not known.
+
+        Raises:
+            InputError: the class scheme is not known.
+        """
+        return None if self.truth is None else self._known_scheme().is_tower(self.truth)
+
+    @property
+    def with_truth(self) -> PointCloud | None:
+        """The same points with their true classes as labels; None where they are not known."""
+        return None if self.truth is None else PointCloud(self.xyz, self.truth, self.scheme)
+
+    @property
+    def is_ground(self) -> np.ndarray:
+        """(N,) bool: points labelled as what looks like bare ground.
+
+        Raises:
+            InputError: the class scheme is not known.
+        """
+        return self._known_scheme().is_ground(self.classification)
 
     @property
     def roles(self) -> np.ndarray:
@@ -71,4 +103,5 @@ class PointCloud:
 
     def select(self, index: np.ndarray) -> PointCloud:
         """The points at ``index`` (a mask or positions), in that order."""
-        return PointCloud(self.xyz[index], self.classification[index], self.scheme, self.crs)
+        truth = None if self.truth is None else self.truth[index]
+        return PointCloud(self.xyz[index], self.classification[index], self.scheme, self.crs, truth)

@@ -15,6 +15,7 @@ from scenenet.pointcloud.file_kinds import kind_of
 from scenenet.pointcloud.las.crs import CrsRecord, read_crs
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
+from scenenet.pointcloud.true_classes import ROUNDING_M, check_same_number, with_true_classes
 from scenenet.pointcloud.ts40k import read_sample
 from scenenet.pointcloud.units import NotMetres, not_metres
 
@@ -114,7 +115,10 @@ def survey_in_metres(path: str | Path) -> SurveyInfo:
 
 
 def iter_chunks(
-    path: str | Path, codes: str | None = None, chunk_points: int = CHUNK_POINTS
+    path: str | Path,
+    codes: str | None = None,
+    chunk_points: int = CHUNK_POINTS,
+    truth: str | Path | None = None,
 ) -> Iterator[PointCloud]:
     """The points of a survey in the order of the file, in chunks.
 
@@ -126,15 +130,21 @@ def iter_chunks(
         path: LAS, LAZ, COPC, .npy or .pt file.
         codes: class scheme (a name of ``SCHEMES``); None if unknown.
         chunk_points: points in each chunk except the last.
+        truth: a second file with the same points in the same order, whose classes are the truth.
 
     Raises:
-        InputError: the file cannot be read; the message names it and the reason, even if the
-            decoder hung or crashed.
+        InputError: a file cannot be read; the message names it and the reason, even if the
+            decoder hung or crashed. Or the points of the two files differ; the message names the
+            first that does.
     """
     if chunk_points < 1:
         raise ValueError(f"chunk_points must be at least 1, not {chunk_points}")
     path = Path(path)
     scheme = None if codes is None else class_scheme(codes)
+    if truth is not None:
+        tolerance = same_points(path, truth)
+        chunks, true = (iter_chunks(p, codes, chunk_points) for p in (path, truth))
+        return with_true_classes(path, chunks, Path(truth), true, tolerance)
     kind = kind_of(path)
     if kind != "las":
         xyz, classes = read_sample(path, kind)
@@ -146,13 +156,28 @@ def iter_chunks(
     return (PointCloud(coordinates(c), class_codes(c), scheme, crs) for c in chunks)
 
 
-def read(path: str | Path, codes: str | None = None) -> PointCloud:
+def same_points(labelled: str | Path, truth: str | Path) -> np.ndarray:
+    """Check that two files can have the same points, from their headers.
+
+    Returns:
+        (3,) m, how much x, y and z of the same point may differ: half a step of each file.
+
+    Raises:
+        InputError: a file cannot be read, or their numbers of points differ.
+    """
+    labels, true = survey_info(labelled), survey_info(truth)
+    check_same_number(true.path, true.n_points, labels.path, labels.n_points)
+    steps = [np.abs(info.scales or (0.0,) * 3) for info in (labels, true)]
+    return np.sum(steps, axis=0) / 2 + ROUNDING_M
+
+
+def read(path: str | Path, codes: str | None = None, truth: str | Path | None = None) -> PointCloud:
     """A whole survey as one cloud; see ``iter_chunks`` for surveys larger than memory.
 
     Raises:
         InputError: as ``iter_chunks``.
     """
-    chunks = list(iter_chunks(path, codes))
+    chunks = list(iter_chunks(path, codes, truth=truth))
     if len(chunks) == 1:
         return chunks[0]
     scheme = None if codes is None else class_scheme(codes)
@@ -160,7 +185,8 @@ def read(path: str | Path, codes: str | None = None) -> PointCloud:
         return PointCloud(np.empty((0, 3)), np.empty(0, np.uint8), scheme, survey_info(path).crs)
     xyz = np.concatenate([chunk.xyz for chunk in chunks])
     classes = np.concatenate([chunk.classification for chunk in chunks])
-    return PointCloud(xyz, classes, scheme, chunks[0].crs)
+    true = [chunk.truth for chunk in chunks if chunk.truth is not None]
+    return PointCloud(xyz, classes, scheme, chunks[0].crs, np.concatenate(true) if true else None)
 
 
 def _triple(values: np.ndarray) -> tuple[float, float, float]:

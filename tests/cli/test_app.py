@@ -134,7 +134,8 @@ def test_evaluate_prints_the_documented_scores(survey, model):
     assert scores["voxel_trivial"]["f05"] == 0
     assert scores["voxel_trivial"]["miou"] == pytest.approx(0.5, abs=0.01)
     assert set(scores["towers"]) == {
-        "precision", "recall", "median_error_m", "n_true", "n_predicted",
+        "precision", "recall", "median_error_m", "median_height_error_m", "median_base_error_m",
+        "n_true", "n_predicted",
     }  # fmt: skip
 
 

@@ -6,10 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from scenenet.core.errors import InputError
 from scenenet.dataset import crops as crops_module
-from scenenet.dataset.crops import CropSettings, cut_crops, read_crops
+from scenenet.dataset.crops import CropSettings, Truth, cut_crops, read_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
-from scenenet.pointcloud import PointCloud, class_scheme, iter_chunks, write_las
+from scenenet.pointcloud import PointCloud, class_scheme, iter_chunks, read, write_las
+from scenenet.synthetic import SyntheticSettings, make_survey
 
 ORIGIN = np.array([500_000.0, 4_630_000.0, 0.0])
 PLACE = np.array([500_030.0, 4_630_020.0])
@@ -20,7 +22,9 @@ def table(*towers: tuple[float, float, float]) -> pd.DataFrame:
     xy = np.array([t[:2] for t in towers]) + ORIGIN[:2]
     heights = [t[2] for t in towers]
     numbers = np.arange(1, len(towers) + 1)
-    return pd.DataFrame({"tower": numbers, "x": xy[:, 0], "y": xy[:, 1], "height": heights})
+    return pd.DataFrame(
+        {"tower": numbers, "x": xy[:, 0], "y": xy[:, 1], "top": heights, "height": heights}
+    )
 
 
 @pytest.fixture
@@ -70,7 +74,7 @@ def test_crops_do_not_depend_on_the_chunks_a_survey_is_read_in(field, tmp_path, 
     (tmp_path / "small").mkdir()
     whole, _ = cut(field[0], towers, tmp_path)
     monkeypatch.setattr(
-        crops_module, "iter_chunks", lambda path, codes: iter_chunks(path, codes, 137)
+        crops_module, "iter_chunks", lambda path, codes, truth: iter_chunks(path, codes, 137, truth)
     )
     pieces, _ = cut(field[0], towers, tmp_path / "small")
     assert pieces == whole
@@ -82,7 +86,9 @@ def test_crops_do_not_depend_on_the_chunks_a_survey_is_read_in(field, tmp_path, 
 def test_a_crop_lists_all_towers_in_it(field, tmp_path):
     _, crops = cut(field[0], table((20, 20, 15.0), (30, 20, 5.0), (50, 20, 5.0)), tmp_path)
     assert [len(crop.towers) for crop, _ in crops] == [2, 1, 1]
-    np.testing.assert_array_equal(crops[0][0].towers, ORIGIN[:2] + np.array([[20, 20], [30, 20]]))
+    np.testing.assert_array_equal(
+        crops[0][0].towers[:, :2], ORIGIN[:2] + np.array([[20, 20], [30, 20]])
+    )
 
 
 def test_a_survey_without_towers_gives_an_empty_store(field, tmp_path):
@@ -104,3 +110,66 @@ def test_samples_are_copied_unchanged(tmp_path, scene):
     np.testing.assert_array_equal(crops[0][1].classification, clouds["sample_1"].classification)
     assert crops[0][0].radius == pytest.approx(14, abs=0.1)
     assert facts["skipped"] == [{"sample": "sample_3.npy", "reason": "it has no labelled tower"}]
+
+
+def true_survey(folder, towers=3):
+    """A synthetic survey with its truth, and the tables of its labelled and its true towers."""
+    labelled, truth = folder / "line.laz", folder / "line.truth.laz"
+    make_survey(SyntheticSettings(towers=towers, seed=5), labelled, truth=truth)
+    tables = [survey_towers(path, "edp", TowerSettings()).towers for path in (labelled, truth)]
+    return labelled, truth, *tables
+
+
+def test_crops_keep_the_truth_of_every_point_and_the_true_towers(tmp_path):
+    labelled, truth, towers, true_towers = true_survey(tmp_path)
+    cut_crops(
+        "line", labelled, "edp", towers, CropSettings(), tmp_path / "crops.zarr.zip",
+        tmp_path / "m.json", Truth(truth, true_towers),
+    )  # fmt: skip
+    whole, true = read(labelled), read(truth)
+    crops = list(read_crops(tmp_path / "m.json"))
+    assert len(crops) == 3
+    for crop, cloud in crops:
+        inside = np.hypot(*(whole.xyz[:, :2] - [crop.x, crop.y]).T) <= crop.radius
+        np.testing.assert_array_equal(cloud.classification, whole.classification[inside])
+        np.testing.assert_array_equal(cloud.truth, true.classification[inside])
+        assert 0 < cloud.is_true_tower.sum() < cloud.is_tower.sum()
+        apart = np.hypot(true_towers["x"] - crop.x, true_towers["y"] - crop.y)
+        near = true_towers[apart <= crop.radius]
+        np.testing.assert_array_equal(crop.true_towers[:, :2], near[["x", "y"]])
+        np.testing.assert_allclose(crop.true_towers[:, 2:].sum(axis=1), near["top"])
+        assert len(crop.towers) == len(crop.true_towers) == 1
+
+
+def test_without_truth_a_crop_has_none(field, tmp_path):
+    _, [(crop, cloud)] = cut(field[0], table((30, 20, 10.0)), tmp_path)
+    assert crop.true_towers is None and cloud.truth is None
+
+
+def test_samples_have_the_truth_of_the_sample_of_the_same_name(scene, tmp_path):
+    samples, true = tmp_path / "samples", tmp_path / "true"
+    for folder in (samples, true):
+        folder.mkdir()
+    for number in range(2):
+        cloud = scene([(15.5, 15.5)], seed=number)
+        codes = cloud.classification.copy()
+        np.save(true / f"{number}.npy", np.column_stack([cloud.xyz, codes]))
+        codes[codes == 4] = 15  # the tree is labelled tower
+        np.save(samples / f"{number}.npy", np.column_stack([cloud.xyz, codes]))
+    towers, true_towers = (
+        survey_towers(path, "edp", TowerSettings(min_points=50)).towers for path in (samples, true)
+    )
+    cut_crops(
+        "s", samples, "edp", towers, CropSettings(), tmp_path / "crops.zarr.zip",
+        tmp_path / "m.json", Truth(true, true_towers),
+    )  # fmt: skip
+    for number, (crop, cloud) in enumerate(read_crops(tmp_path / "m.json")):
+        assert crop.id == f"s-{number}"
+        np.testing.assert_array_equal(cloud.truth, np.load(true / f"{number}.npy")[:, 3])
+        np.testing.assert_allclose(crop.true_towers[:, 3], [14.0], atol=0.1)
+    (true / "1.npy").rename(true / "2.npy")
+    with pytest.raises(InputError, match=r"true/1\.npy"):
+        cut_crops(
+            "s", samples, "edp", towers, CropSettings(), tmp_path / "crops.zarr.zip",
+            tmp_path / "m.json", Truth(true, true_towers),
+        )  # fmt: skip

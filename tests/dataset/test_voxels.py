@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from scenenet.core.errors import InputError
-from scenenet.dataset.crops import CropSettings, cut_crops
+from scenenet.dataset.crops import CropSettings, Truth, cut_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.voxel_cache import build, load
 from scenenet.dataset.voxels import VoxelGrid, VoxelSettings, voxelise
@@ -179,3 +179,29 @@ def test_real_crops_have_the_voxels_of_the_published_code(real_samples, name):
     occupied, tower = PUBLISHED[name]
     assert abs(len(sample.index) - occupied) <= 3
     assert abs(int(sample.tower.sum()) - tower) <= 3
+
+
+def test_a_voxel_is_true_if_any_of_its_points_is_tower_in_truth(scene, tmp_path):
+    made = scene()
+    labels = made.classification.copy()
+    labels[made.classification == 4] = 15  # the tree is labelled tower
+    both = PointCloud(made.xyz, labels, EDP, truth=made.classification)
+    grid = VoxelGrid.metric(made.xyz, 1.0)
+    sample = voxelise(both, grid)
+    np.testing.assert_array_equal(sample.true, voxelise(made, grid).tower)
+    assert 0 < sample.true.sum() < sample.tower.sum()
+    np.testing.assert_array_equal(np.flatnonzero(sample.truth()), sample.index[sample.true])
+    assert voxelise(made, grid).true is None and voxelise(made, grid).truth() is None
+
+    # The cache keeps it.
+    folders = [tmp_path / "labelled", tmp_path / "true"]
+    for folder, codes in zip(folders, (labels, made.classification), strict=True):
+        folder.mkdir()
+        np.save(folder / "a.npy", np.column_stack([made.xyz, codes]))
+    tables = [survey_towers(f, "edp", TowerSettings(min_points=50)).towers for f in folders]
+    crops, voxels = tmp_path / "crops.json", tmp_path / "voxels.json"
+    cut_crops("s", folders[0], "edp", tables[0], CropSettings(), tmp_path / "c.zarr.zip", crops,
+              Truth(folders[1], tables[1]))  # fmt: skip
+    build(crops, VoxelSettings(fit="metric", voxel_size=1.0), tmp_path / "v.zarr.zip", voxels)
+    [cached] = load([voxels]).samples
+    np.testing.assert_array_equal(cached.true, sample.true)

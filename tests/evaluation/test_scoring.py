@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,8 +15,10 @@ from scenenet.dataset.voxel_cache import Dataset
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample
 from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.crop_towers import detect_in_crop
-from scenenet.evaluation.result import Evaluation
+from scenenet.evaluation.points import PointCounts
+from scenenet.evaluation.result import Evaluation, PointScores
 from scenenet.evaluation.scoring import evaluate, score, score_predictions
+from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.base import VoxelModel
 from scenenet.models.factory import new_model
 from scenenet.models.model_file import ModelCard, write_model
@@ -81,7 +84,8 @@ def test_a_perfect_model_scores_one():
     for name in ("precision", "recall", "f05", "iou_tower", "miou"):
         assert getattr(result.voxel, name) == 1.0
     assert result.to_json()["towers"] == {
-        "precision": 1.0, "recall": 1.0, "median_error_m": 0.0, "n_true": 2, "n_predicted": 2,
+        "precision": 1.0, "recall": 1.0, "median_error_m": 0.0, "median_height_error_m": None,
+        "median_base_error_m": None, "n_true": 2, "n_predicted": 2,
     }  # fmt: skip
     assert result.average_precision == 1.0
     assert result.alive is True
@@ -128,7 +132,8 @@ def test_a_voxel_at_tau_is_detected():
 def test_a_detected_tower_far_from_every_labelled_one_is_false():
     result = scores(Mock(pole(5) | pole(15)), crop(1, 5, 25))
     assert result.to_json()["towers"] == {
-        "precision": 0.5, "recall": 0.5, "median_error_m": 0.0, "n_true": 2, "n_predicted": 2,
+        "precision": 0.5, "recall": 0.5, "median_error_m": 0.0, "median_height_error_m": None,
+        "median_base_error_m": None, "n_true": 2, "n_predicted": 2,
     }  # fmt: skip
     [sample] = result.per_sample
     assert (sample.towers_true, sample.towers_predicted) == (2, 2)
@@ -225,3 +230,55 @@ def test_a_model_in_metres_predicts_whole_towers_by_default(whole):
     )
     result = score(new_model(settings, 0), CARD, Dataset([], [], "edp", []), LONE_POLES)
     assert result.whole_towers is whole
+
+
+def with_truth(number: int, labelled: tuple[int, ...], true: tuple[int, ...]):
+    """A crop with poles labelled at ``labelled`` that stand at ``true``."""
+    sample, of_sample = crop(number, *labelled)
+    standing, of_standing = crop(number, *true)
+    np.testing.assert_array_equal(sample.index, standing.index)
+    return (
+        replace(sample, true=standing.tower),
+        replace(of_sample, true_towers=of_standing.towers),
+    )
+
+
+def test_every_score_is_given_against_the_labels_and_against_the_truth():
+    """The model finds the pole at 5 and none other; the label at 15 is wrong."""
+    found = scores(Mock(pole(5), pole(5)), with_truth(1, (5, 15), (5,)), crop(2, 15))
+    assert (found.voxel.precision, found.voxel.recall) == (0.5, pytest.approx(1 / 3))
+    assert found.voxel.n_samples == 2
+    truth = found.truth
+    assert truth is found.leading
+    assert truth.voxel.n_samples == 1  # the second crop has no truth
+    for scored in (truth.voxel, truth.voxel_observer, truth.voxel_occupied):
+        assert (scored.precision, scored.recall, scored.f05) == (1.0, 1.0, 1.0)
+    assert truth.average_precision == 1.0 > found.average_precision
+    assert (truth.towers.recall, truth.towers.n_true) == (1.0, 1)
+    assert (found.towers.recall, found.towers.n_true) == (pytest.approx(1 / 3), 3)
+    assert [(s.id, s.tp, s.fn, s.towers_true) for s in truth.per_sample] == [("crop-1", 12, 0, 1)]
+    assert Evaluation.from_json(json.loads(json.dumps(found.to_json()))) == found
+
+
+def test_without_a_known_truth_there_are_no_scores_against_it():
+    found = scores(Mock(pole(5)), crop(1, 5))
+    assert found.truth is None and found.labels_against_truth is None
+    assert found.leading is found
+    assert found.to_json()["truth"] is None
+
+
+def test_points_of_crops_are_summed_against_labels_and_truth():
+    points = {
+        "crop-1": PointCounts(
+            Confusion(4, 1, 5, 10), Confusion(3, 2, 0, 15), Confusion(3, 6, 0, 11)
+        ),
+        "crop-2": PointCounts(Confusion(0, 5, 0, 20)),
+    }
+    samples, crops = zip(with_truth(1, (5, 15), (5,)), crop(2, 15), strict=True)
+    dataset = Dataset(list(samples), list(crops), "edp", [])
+    found = score(Mock(pole(5), pole(5)), CARD, dataset, LONE_POLES, points)
+    assert found.points == PointScores(4 / 10, 4 / 9, 4 / 15, n_true=9, n_predicted=10)
+    assert found.truth.points == PointScores(3 / 5, 1.0, 3 / 5, n_true=3, n_predicted=5)
+    assert found.labels_against_truth == PointScores(3 / 9, 1.0, 3 / 9, n_true=3, n_predicted=9)
+    assert [s.points.n_predicted for s in found.per_sample] == [5, 5]
+    assert found.per_sample[1].points.recall is None  # nothing is labelled

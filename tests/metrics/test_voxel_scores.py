@@ -184,6 +184,8 @@ def test_a_tower_within_5_m_is_a_hit():
         "precision": 0.5,
         "recall": 0.5,
         "median_error_m": 5.0,
+        "median_height_error_m": None,
+        "median_base_error_m": None,
         "n_true": 2,
         "n_predicted": 2,
     }
@@ -216,6 +218,8 @@ def test_without_matches_there_is_no_position_error(n_predicted, n_true, precisi
         "precision": precision,
         "recall": recall,
         "median_error_m": None,
+        "median_height_error_m": None,
+        "median_base_error_m": None,
         "n_true": n_true,
         "n_predicted": n_predicted,
     }
@@ -224,5 +228,24 @@ def test_without_matches_there_is_no_position_error(n_predicted, n_true, precisi
 def test_matches_of_samples_add_up():
     total = TowerMatch(np.array([1.0]), 1, 2) + TowerMatch(np.array([3.0, 4.0]), 3, 2)
     assert total.scores() == {
-        "precision": 0.75, "recall": 0.75, "median_error_m": 3.0, "n_true": 4, "n_predicted": 4,
+        "precision": 0.75, "recall": 0.75, "median_error_m": 3.0, "median_height_error_m": None,
+        "median_base_error_m": None, "n_true": 4, "n_predicted": 4,
     }  # fmt: skip
+
+
+def test_heights_and_bases_of_matched_towers_are_compared():
+    """The second true tower has no known ground; the third predicted one is false."""
+    true = np.array([[0.0, 0, 100, 20], [50, 0, np.nan, np.nan], [100, 0, 90, 30]])
+    found = np.array([[101.0, 0, 92, 27], [0, 1, 99, 22], [51, 0, 70, 5], [300, 0, 0, 99]])
+    match = match_towers(found, true)
+    assert sorted(match.base_errors) == [1.0, 2.0]
+    assert sorted(match.height_errors) == [2.0, 3.0]
+    scores = match.scores()
+    assert (scores["median_height_error_m"], scores["median_base_error_m"]) == (2.5, 1.5)
+    total = (match + match_towers(np.array([[0.0, 0, 8, 9]]), np.array([[0.0, 0, 0, 0]]))).scores()
+    assert (total["median_height_error_m"], total["median_base_error_m"]) == (3.0, 2.0)
+
+
+def test_masks_of_points_are_counted():
+    predicted, true = np.array([1, 1, 0, 0, 0], bool), np.array([1, 0, 1, 1, 0], bool)
+    assert Confusion.of(predicted, true) == Confusion(tp=1, fp=1, fn=2, tn=1)

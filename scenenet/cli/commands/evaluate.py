@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -24,6 +25,7 @@ from scenenet.cli.output import score_lines, show
 EXAMPLES = (
     "scenenet evaluate labelled.laz --model model.json --codes edp",
     "scenenet evaluate labelled.laz --model model.json --codes asprs --fit metric",
+    "scenenet evaluate line.laz --model model.json --codes edp --truth line.truth.laz",
 )
 
 GRID_OF_THE_THESIS = Fits("cube")
@@ -41,6 +43,14 @@ def command(
         ),
     ] = GRID_OF_THE_THESIS,
     resolution: Resolution = 64,
+    truth: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="The same points in the same order with their true classes, as scenenet synth "
+            "--truth writes. Give one for each labelled file, in their order. Every score is then "
+            "given against the labels and against the truth."
+        ),
+    ] = None,
     min_conductor: MinConductor = None,
     as_json: AsJson = False,
 ) -> None:
@@ -50,14 +60,23 @@ def command(
 
     A predicted tower within 5 m of a labelled one is a true positive.
 
+    The point scores compare the points to which scenenet predict gives a tower id with the points
+    labelled tower: all points of each file, whatever --fit is.
+
     The exit code is 1 if a file fails; the other files are still scored.
     """
     from scenenet.cli.labelled_files import evaluate_files
 
+    truths = truth or []
+    if truths and len(truths) != len(labelled):
+        raise typer.BadParameter(
+            f"{len(truths)} for {len(labelled)} labelled files; give one for each, in their order",
+            param_hint="--truth",
+        )
     grid = cube(resolution) if fit.value == "cube" else None
     detection = detection_settings(min_conductor)
     failures = Failures()
-    result = evaluate_files(labelled, model, codes.value, grid, detection, failures)
+    result = evaluate_files(labelled, model, codes.value, grid, detection, failures, truths)
     for skipped in result["skipped"]:
         print(f"not scored: {skipped['sample']}: {skipped['reason']}", file=sys.stderr)
     show(result, as_json, score_lines)

@@ -50,8 +50,8 @@ class Tally:
     def add(self, detected: np.ndarray, labelled: VoxelSample, true: VoxelSample) -> None:
         """Count a crop; ``detected`` (V,) bool is for every voxel of its grid."""
         labels, truth = _towers(labelled), _towers(true)
-        self.labels += _compared(detected, labels)
-        self.truth += _compared(detected, truth)
+        self.labels += Confusion.of(detected, labels)
+        self.truth += Confusion.of(detected, truth)
         wrong = labels & ~truth
         self.wrong += int(wrong.sum())
         self.wrong_detected += int((wrong & detected).sum())
@@ -156,9 +156,3 @@ def _tallied(
 def _towers(sample: VoxelSample) -> np.ndarray:
     """(V,) bool: voxels of a sample that are labelled tower."""
     return sample.spread(sample.tower)[1]
-
-
-def _compared(detected: np.ndarray, tower: np.ndarray) -> Confusion:
-    tp, n_detected, n_tower = (int(each.sum()) for each in (detected & tower, detected, tower))
-    fp, fn = n_detected - tp, n_tower - tp
-    return Confusion(tp, fp, fn, tower.size - tp - fp - fn)

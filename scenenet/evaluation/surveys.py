@@ -1,0 +1,120 @@
+"""Scores of the answer that ``scenenet predict`` gives for a labelled survey: points, towers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from scenenet.core.errors import in_file
+from scenenet.core.progress import track
+from scenenet.core.unchanged import unchanged
+from scenenet.dataset.crops import Crop
+from scenenet.dataset.tower_places import TowerPlaces
+from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.crop_towers import places_of
+from scenenet.evaluation.points import PointCounts
+from scenenet.metrics.tower_matching import TowerMatch, match_towers
+from scenenet.pointcloud import PointCloud, iter_chunks
+from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.settings import PredictSettings
+
+
+@dataclass(frozen=True)
+class LabelledSurvey:
+    """A survey or TS40K sample with its labels, and with its truth where it is known.
+
+    Attributes:
+        path: the file.
+        codes: class scheme of its labels and of its truth.
+        towers: table of its labelled towers (``labelled_towers.COLUMNS``).
+        crops: the crops that were cut from it; a TS40K sample is a single crop as it is.
+        is_sample: whether it is a TS40K sample.
+        truth: a file with the same points in the same order, with the true classes.
+        true_towers: table of its true towers.
+    """
+
+    path: Path
+    codes: str
+    towers: pd.DataFrame
+    crops: tuple[Crop, ...]
+    is_sample: bool
+    truth: Path | None = None
+    true_towers: pd.DataFrame | None = None
+
+
+@dataclass(frozen=True)
+class SurveyScores:
+    """What was counted in a whole survey; the counts of surveys add up.
+
+    Attributes:
+        points: of all points.
+        by_crop: of the points of each crop, by its id.
+        towers: the towers found against the labelled ones.
+        true_towers: the towers found against the true ones; None where the truth is not known.
+    """
+
+    points: PointCounts = field(default_factory=PointCounts)
+    by_crop: Mapping[str, PointCounts] = field(default_factory=dict)
+    towers: TowerMatch = field(default_factory=TowerMatch.none)
+    true_towers: TowerMatch | None = None
+
+    def __add__(self, other: SurveyScores) -> SurveyScores:
+        matches = [m for m in (self.true_towers, other.true_towers) if m is not None]
+        return SurveyScores(
+            self.points + other.points,
+            {**self.by_crop, **other.by_crop},
+            self.towers + other.towers,
+            sum(matches[1:], matches[0]) if matches else None,
+        )
+
+
+def score_survey(
+    survey: LabelledSurvey, model: str | Path, detection: DetectionSettings
+) -> SurveyScores:
+    """Predict a whole survey at the voxel size of the model, and score its towers and points.
+
+    Memory is bounded by a chunk of points and a tile of voxels.
+
+    Args:
+        model: model file with tau.
+
+    Raises:
+        InputError: the survey, its truth or the model cannot be used.
+    """
+    counts, places = PointCounts(), TowerPlaces(survey.towers)
+    by_crop = {crop.id: PointCounts() for crop in survey.crops}
+    true_places = None if survey.true_towers is None else TowerPlaces(survey.true_towers)
+    settings = PredictSettings()
+    with predict_survey(survey.path, model, settings, detection) as prediction:
+        files = (prediction.state, *(() if survey.truth is None else (survey.truth,)))
+        with unchanged(*files), in_file(survey.path):
+            chunks = iter_chunks(survey.path, survey.codes, settings.chunk_points, survey.truth)
+            for chunk in track(chunks, f"{survey.path.name}: points scored"):
+                in_tower = prediction.look_up(chunk.xyz).tower_id > 0
+                counts += PointCounts.of(chunk, in_tower)
+                for crop in survey.crops:
+                    inside = _inside(chunk, crop, survey.is_sample)
+                    by_crop[crop.id] += PointCounts.of(chunk.select(inside), in_tower[inside])
+                places.add(chunk)
+                if true_places is not None and (true := chunk.with_truth) is not None:
+                    true_places.add(true)
+        found = places_of(prediction.towers)
+    return SurveyScores(
+        counts,
+        by_crop,
+        match_towers(found, places.places()),
+        None if true_places is None else match_towers(found, true_places.places()),
+    )
+
+
+def _inside(chunk: PointCloud, crop: Crop, is_sample: bool) -> np.ndarray:
+    """Positions of the points of a chunk that lie in a crop, as ``dataset.crops`` cuts it."""
+    if is_sample:
+        return np.arange(len(chunk))
+    offset = chunk.xyz[:, :2] - (crop.x, crop.y)
+    near = np.flatnonzero((np.abs(offset) <= crop.radius).all(axis=1))
+    return near[(offset[near] ** 2).sum(axis=1) <= crop.radius**2]

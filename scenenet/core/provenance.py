@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -48,6 +49,15 @@ def fingerprint(path: str | Path, full_below_bytes: int = FULL_BELOW_BYTES) -> s
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from None
     return f"size-mtime:{status.st_size}-{status.st_mtime_ns}"
+
+
+def is_still(path: str | Path, known: str) -> bool:
+    """Whether ``known`` is a fingerprint of the file or folder, whatever ``full_below_bytes`` was.
+
+    Raises:
+        InputError: the file cannot be read.
+    """
+    return any(fingerprint(path, limit) == known for limit in (0, sys.maxsize))
 
 
 def record(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 
 import pytest
 
@@ -65,3 +66,35 @@ def test_an_error_that_comes_from_the_change_is_replaced_and_any_other_is_not(fi
     with pytest.raises(InputError, match="changed"), unchanged(file):
         file.write_bytes(b"another")
         raise IndexError
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("a.npy", "b.npy", "notes.txt"):
+        (tmp_path / name).write_bytes(b"content")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda folder: (folder / "b.npy").write_bytes(b"another"), "b.npy"),
+        (lambda folder: (folder / "a.npy").unlink(), "a.npy"),
+        (lambda folder: (folder / "c.pt").write_bytes(b"new"), "c.pt"),
+    ],
+    ids=["changed", "removed", "added"],
+)
+def test_a_sample_that_changes_in_a_folder_is_named(folder, change, named):
+    with pytest.raises(InputError, match=named), unchanged(folder):
+        change(folder)
+
+
+def test_other_files_in_a_folder_of_samples_may_change(folder):
+    with unchanged(folder):
+        (folder / "notes.txt").write_bytes(b"other notes")
+        (folder / "model.json").touch()
+
+
+def test_a_folder_that_is_missing_is_named(folder):
+    with pytest.raises(InputError, match="changed, replaced or removed"), unchanged(folder):
+        shutil.rmtree(folder)

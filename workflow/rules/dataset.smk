@@ -37,6 +37,7 @@ rule crops:
     input:
         survey=lambda w: source(w.survey),
         towers=f"{R}/towers/{{survey}}/towers.csv",
+        towers_record=f"{R}/towers/{{survey}}/provenance.json",
     output:
         store=f"{R}/crops/{{survey}}/crops.zarr.zip",
         manifest=f"{R}/crops/{{survey}}/manifest.json",

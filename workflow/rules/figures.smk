@@ -80,6 +80,7 @@ rule tower_map:
     input:
         survey=lambda w: source(w.survey),
         towers=f"{R}/towers/{{survey}}/towers.csv",
+        towers_record=f"{R}/towers/{{survey}}/provenance.json",
     output:
         **picture_in_report(
             "clusters-{survey}",

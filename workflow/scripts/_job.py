@@ -6,6 +6,7 @@ inside that function, so that every error, even a missing library, is in the log
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import os
 import sys
@@ -25,6 +26,16 @@ THREAD_VARIABLES = (
     "NUMBA_NUM_THREADS",
     "RAYON_NUM_THREADS",
 )
+
+
+NOT_RECORDED = ("store", "stores", "towers_record")
+"""Inputs without a fingerprint in the record: the manifests of stores have a digest of them, and
+the record of the labelled towers stands beside their table, which has one."""
+
+
+RECIPE, UNREADABLE = "recipe:", "unreadable"
+"""How the parameter of a job begins that stands for a synthetic survey, and for one that could not
+be read when the run was planned (``source_print`` in the rules)."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +90,7 @@ class Job:
         for name, files in self.input.items():
             if name in known:
                 yield name, known[name]
-            elif name not in (
-                "store",
-                "stores",
-            ):  # their manifests have a digest of them
+            elif name not in NOT_RECORDED:
                 single = isinstance(files, str)
                 yield name, _print(files) if single else [_print(file) for file in files]
 
@@ -104,12 +112,48 @@ def run(stage: Callable[[Job], object]) -> None:
     # Libraries read these when they are imported, so they come before any import of the package.
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, str(snakemake.threads)))
     job = Job(snakemake.params.job, snakemake.input, snakemake.output, snakemake.threads)
-    stage(job)
+    with _one_survey(job):
+        stage(job)
     record = getattr(job.output, "provenance", None)
     if record is not None:
         from scenenet.core.files import write_json
 
         write_json(record, job.record())
+
+
+@contextlib.contextmanager
+def _one_survey(job: Job) -> Iterator[None]:
+    """Make sure that a job uses, to its end, the survey that was there when the run was planned and
+    that its labelled towers were found in."""
+    survey = getattr(job.input, "survey", None)
+    if survey is None:
+        yield
+        return
+    from scenenet.core.unchanged import unchanged
+
+    with unchanged(survey):
+        _require_planned(job, survey)
+        yield
+
+
+def _require_planned(job: Job, survey: str) -> None:
+    from scenenet.core.errors import InputError
+    from scenenet.core.files import read_json
+    from scenenet.core.provenance import is_still
+
+    planned = job.identity.get("input", {}).get("survey", UNREADABLE)
+    towers = getattr(job.input, "towers_record", None)
+    same = towers is None or read_json(towers)["inputs"]["survey"] == planned
+    # A synthetic survey is known by its recipe. An unreadable one fails in its own stage.
+    if not planned.startswith((RECIPE, UNREADABLE)):
+        same = same and is_still(survey, planned)
+    if not same:
+        raise InputError(
+            "the survey was replaced while the workflow ran, or after its labelled towers were "
+            "found",
+            file=survey,
+            remedy="Run the workflow again when no program writes to the survey",
+        )
 
 
 class _Both:

@@ -9,12 +9,13 @@ from typing import Any
 
 from scenenet.cli.inputs import Failures
 from scenenet.core.errors import InputError, in_file, warn
-from scenenet.core.scratch import scratch_folder
+from scenenet.core.outputs import check_space
+from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.unchanged import unchanged
-from scenenet.dataset.crops import Crop, CropSettings, Truth, crop_of, cut_crops
+from scenenet.dataset.crops import Crop, CropSettings, CropSpace, Truth, crop_of, cut_crops
 from scenenet.dataset.labelled_towers import LabelledTowers, TowerSettings, survey_towers
 from scenenet.dataset.split import SplitSettings, split_crops
-from scenenet.dataset.voxel_cache import Dataset, build, load
+from scenenet.dataset.voxel_cache import VOXEL_BYTES, Dataset, build, load
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.result import Evaluation, PointScores, TowerScores
@@ -69,12 +70,18 @@ def read_labelled(
         split: the shares of the split; a single crop is not split.
         truths: for each of ``paths`` a file with the same points in the same order, with the true
             classes, or a folder of such samples; empty where the truth is not known.
+
+    Raises:
+        OutputError: the disk of the temporary files has too little space.
     """
     files = LabelledFiles()
     pairs: list[tuple[Path, Path | None]] = [
         (path, truths[number] if truths else None) for number, path in enumerate(paths)
     ]
     seen = failures.look_at(dict.fromkeys(pairs), _look)
+    stored = sum(space.stored + VOXEL_BYTES * space.points for space in seen.values())
+    spooled = max((space.temporary for space in seen.values()), default=0)
+    check_space({temporary_directory(): stored + spooled})
     with scratch_folder() as scratch:
         manifests: list[tuple[Path, Path]] = []
         for number, (path, truth) in enumerate(pairs, start=1):
@@ -94,7 +101,7 @@ def read_labelled(
     return replace(files, dataset=dataset, parts=parts)
 
 
-def _look(pair: tuple[Path, Path | None]) -> None:
+def _look(pair: tuple[Path, Path | None]) -> CropSpace:
     """Look at the headers and the unit of a survey and its truth, or for the files of samples.
 
     Raises:
@@ -108,6 +115,7 @@ def _look(pair: tuple[Path, Path | None]) -> None:
         survey_in_metres(path)
     if truth is not None and not path.is_dir():
         same_points(path, truth)
+    return CropSpace.of(path)
 
 
 def _read_file(

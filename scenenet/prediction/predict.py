@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.core.errors import in_file
+from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
-from scenenet.core.scratch import scratch_folder
+from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.unchanged import FileState, unchanged
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
@@ -28,6 +29,10 @@ if TYPE_CHECKING:
 
     from scenenet.models.base import VoxelModel
     from scenenet.models.model_file import ModelCard
+
+
+SCRATCH_BYTES = 8
+"""Bytes of temporary files for a point. Most measured on airborne and mobile surveys: 3.1."""
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,7 @@ def predict_survey(
 
     Raises:
         InputError: the survey or the model cannot be used.
+        OutputError: the disk of the temporary files has too little space.
     """
     from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
@@ -107,6 +113,7 @@ def predict_survey(
     voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
     state = FileState.of(survey)
     name, info = Path(survey).name, survey_in_metres(survey)
+    check_space({temporary_directory(): SCRATCH_BYTES * info.n_points})
     screening = Screening(info)
     with scratch_folder() as scratch:
         spool = TileSpool(scratch, voxel_size)

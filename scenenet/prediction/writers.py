@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,12 +12,13 @@ import numpy as np
 
 from scenenet.core.errors import InputError, warn
 from scenenet.core.files import atomic, read_json, write_json
-from scenenet.core.outputs import Output
+from scenenet.core.outputs import Output, check_space
 from scenenet.core.provenance import fingerprint
+from scenenet.core.scratch import temporary_directory
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.pointcloud import add_dimensions
-from scenenet.prediction.predict import SurveyPrediction, predict_survey
+from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
 
@@ -29,9 +30,9 @@ TOWER_ID = "tower_id"
 SHARE_PREFIX = "share_"
 
 
-RESULT_BYTES, SCRATCH_BYTES = 12, 8
-"""Bytes that a point takes in the result, beyond those in the survey, and in temporary files. Most
-measured on airborne and mobile surveys: 11.4 and 3.1."""
+RESULT_BYTES = 12
+"""Bytes that a point takes in the result, beyond those in the survey. Most measured on airborne and
+mobile surveys: 11.4."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +73,20 @@ class PredictionFiles:
             return False
 
 
-def space_needed(survey: Path, n_points: int) -> tuple[int, int]:
-    """About how many bytes the results of a survey take, and the temporary files meanwhile."""
-    return survey.stat().st_size + RESULT_BYTES * n_points, SCRATCH_BYTES * n_points
+def require_space(surveys: Mapping[Path, int], out: Path) -> None:
+    """Check that the disks have room for all results, and for the temporary files of one survey.
+
+    Args:
+        surveys: their files, with the number of points of each.
+        out: folder of the results.
+
+    Raises:
+        OutputError: a disk has too little space.
+    """
+    points = surveys.values()
+    results = sum(path.stat().st_size for path in surveys) + RESULT_BYTES * sum(points)
+    scratch = SCRATCH_BYTES * max(points, default=0)
+    check_space({out: results, temporary_directory(): scratch})
 
 
 def predict_to_files(

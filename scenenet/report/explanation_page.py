@@ -10,21 +10,26 @@ import pandas as pd
 
 from scenenet.core.errors import warn
 from scenenet.core.files import write_text
+from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
-from scenenet.core.scratch import scratch_folder
+from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.unchanged import unchanged
 from scenenet.detection.settings import DetectionSettings
 from scenenet.figures import Picture
 from scenenet.figures.plots.point_clouds import View, side_views
 from scenenet.interpretability.explanations import TowerExplanation, explanations, meanings
 from scenenet.models.model_file import ModelCard
-from scenenet.pointcloud import iter_chunks
-from scenenet.prediction.predict import SurveyPrediction, predict_survey
+from scenenet.pointcloud import iter_chunks, survey_in_metres
+from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section, Text, table, write
 from scenenet.report.page import render
 
 POINTS_PER_PICTURE = 20_000
+
+FIRST_TOWER_BYTES, POINT_BYTES = 500_000, 2
+"""Size of a page: that of a page with one tower, and what each point of the survey adds, because a
+longer survey has more towers. Measured pages are a quarter to three quarters as large."""
 
 GENERATOR = "scenenet explain"
 """Mark of the page in its head."""
@@ -55,7 +60,12 @@ def explain_survey(
 
     Raises:
         InputError: the survey or the model cannot be used.
+        OutputError: the page cannot be written, or a disk has too little space.
     """
+    points = survey_in_metres(survey).n_points
+    page = FIRST_TOWER_BYTES + POINT_BYTES * points
+    # The pictures are drawn to temporary files.
+    check_space({Path(out): page, temporary_directory(): SCRATCH_BYTES * points + page})
     with predict_survey(survey, model, settings, detection) as prediction:
         warn(survey, prediction.warnings)
         card = prediction.card

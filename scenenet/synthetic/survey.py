@@ -10,14 +10,20 @@ from typing import Any
 import numpy as np
 
 from scenenet.core.files import write_json
+from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
 from scenenet.pointcloud.las.writing import las_stream
 from scenenet.synthetic.codes import TOWER
-from scenenet.synthetic.corridor import TrueTower, make_corridor
+from scenenet.synthetic.corridor import Corridor, TrueTower, make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
 
 GENERATOR = "scenenet synth"
 """The generating software in the header of a synthetic survey."""
+
+POINTS_PER_PULSE = 2.2
+"""Points of a survey for each pulse of ``SyntheticSettings.density``; most measured: 2.03."""
+POINT_BYTES = {".laz": 5, ".las": 30}
+"""Bytes that a point takes; most measured in LAZ: 5.02."""
 
 
 def make_survey(
@@ -44,8 +50,11 @@ def make_survey(
 
     Raises:
         InputError: a setting or path is invalid.
+        OutputError: a file cannot be written, or a disk has too little space for it.
     """
     corridor = make_corridor(settings)
+    surveys = [Path(path) for path in (out, truth) if path is not None]
+    check_space({path: space_needed(corridor, path) for path in surveys})
     stretches = corridor.stretches(workers or len(os.sched_getaffinity(0)))
     if progress is not None:
         stretches = track(stretches, progress, total=len(corridor))
@@ -74,6 +83,12 @@ def make_survey(
         "classes": {int(code): int(counts[code]) for code in np.flatnonzero(counts)},
         "mislabelled": round(wrong / max(int(counts[TOWER]), 1), 4),
     }
+
+
+def space_needed(corridor: Corridor, path: Path) -> int:
+    """About how many bytes the survey of a corridor takes in the file ``path``."""
+    pulses = corridor.length * 2 * corridor.settings.half_width * corridor.settings.density
+    return int(pulses * POINTS_PER_PULSE * POINT_BYTES.get(path.suffix.lower(), 0))
 
 
 def is_synthetic_survey(path: Path) -> bool:

@@ -6,6 +6,7 @@ import json
 import re
 import resource
 import shutil
+import tempfile
 
 import laspy
 import pytest
@@ -130,15 +131,29 @@ def test_a_result_folder_that_is_a_file_is_named_before_the_work(
     assert "chunks read" not in done.err
 
 
+@pytest.mark.parametrize("command", ["predict", "explain", "train", "evaluate", "synth"])
 def test_too_little_space_is_said_before_the_work(
-    call, pole_survey, pole_model, tmp_path, monkeypatch
+    call, pole_survey, pole_model, tmp_path, monkeypatch, command
 ):
+    if command == "explain":
+        pytest.importorskip("matplotlib")
     monkeypatch.setattr("scenenet.core.outputs.free_space", lambda path: 1000)
-    done = call("predict", pole_survey, "--model", pole_model, "--out", tmp_path / "out")
+    out = tmp_path / {"synth": "made.laz", "explain": "page.html", "train": "m.json"}.get(
+        command, "out"
+    )
+    done = call(command, *{
+        "predict": (pole_survey, "--model", pole_model, "--out", out),
+        "explain": (pole_survey, "--model", pole_model, "--out", out),
+        "train": (pole_survey, "--codes", "edp", "--out", out),
+        "evaluate": (pole_survey, "--model", pole_model, "--codes", "edp"),
+        "synth": (out, "--towers", 1),
+    }[command])  # fmt: skip
     assert done.code == 1
+    place = str(out if command in ("predict", "explain", "synth") else tempfile.gettempdir())
+    assert f"error: {place}" in done.err
     assert "MB are needed, and 0.0 MB are free" in done.err
-    assert "chunks read" not in done.err
-    assert not (tmp_path / "out").exists()
+    assert "chunks read" not in done.err and "made" not in done.out
+    assert not out.exists()
 
 
 def test_a_file_that_cannot_grow_ends_with_a_message_and_no_result(

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, OutputError
 from scenenet.dataset import crops as crops_module
-from scenenet.dataset.crops import CropSettings, Truth, cut_crops, read_crops
+from scenenet.dataset.crops import CropSettings, CropSpace, Truth, cut_crops, read_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.pointcloud import PointCloud, class_scheme, iter_chunks, read, write_las
 from scenenet.synthetic import SyntheticSettings, make_survey
@@ -95,6 +95,29 @@ def test_a_survey_without_towers_gives_an_empty_store(field, tmp_path):
     towers = survey_towers(field[0], "edp", TowerSettings(min_points=100_000)).towers
     facts, crops = cut(field[0], towers, tmp_path)
     assert facts["crops"] == crops == []
+
+
+def test_too_little_space_for_a_store_is_said_before_the_survey_is_read(
+    field, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr("scenenet.core.outputs.free_space", lambda path: 50_000)
+    with pytest.raises(OutputError, match=r"crops\.zarr\.zip.*0\.1 MB are needed, and 0\.1 MB"):
+        cut(field[0], table((30, 20, 10.0)), tmp_path)
+    assert "chunks read" not in capsys.readouterr().err
+    assert not (tmp_path / "crops.zarr.zip").exists()
+
+
+def test_the_estimate_of_space_holds_the_crops_and_is_not_far_above(tmp_path, scene):
+    samples = tmp_path / "samples"
+    samples.mkdir()
+    cloud = scene()
+    np.save(samples / "a.npy", np.column_stack([cloud.xyz, cloud.classification]))
+    write_las(tmp_path / "a.laz", cloud)
+    for path in (samples, tmp_path / "a.laz"):
+        towers = survey_towers(path, "edp", TowerSettings(min_points=100)).towers
+        cut(path, towers, tmp_path)
+        written = (tmp_path / "crops.zarr.zip").stat().st_size
+        assert written <= CropSpace.of(path).stored <= 5 * written
 
 
 def test_samples_are_copied_unchanged(tmp_path, scene):

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, OutputError
 from scenenet.dataset.crops import CropSettings, Truth, cut_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.voxel_cache import build, load
@@ -161,6 +161,19 @@ def test_the_cache_returns_what_was_voxelised(tmp_path, scene):
         assert entry["tower"] == expected.tower.sum() > 0
     assert [s.id for s in load([voxels], {"s-sample_1"}).samples] == ["s-sample_1"]
     assert StoreReader(voxels).manifest["grid"] == settings.model_dump()
+
+
+def test_too_little_space_for_the_voxels_is_said(tmp_path, scene, monkeypatch):
+    cloud = scene()
+    np.save(tmp_path / "a.npy", np.column_stack([cloud.xyz, cloud.classification]))
+    towers = survey_towers(tmp_path / "a.npy", "edp", TowerSettings(min_points=100)).towers
+    crops, voxels = tmp_path / "crops.json", tmp_path / "voxels.zarr.zip"
+    store = tmp_path / "crops.zarr.zip"
+    cut_crops("s", tmp_path / "a.npy", "edp", towers, CropSettings(), store, crops)
+    monkeypatch.setattr("scenenet.core.outputs.free_space", lambda path: 1000)
+    with pytest.raises(OutputError, match=r"voxels\.zarr\.zip.*MB are needed, and 0\.0 MB"):
+        build(crops, VoxelSettings(), voxels, tmp_path / "voxels.json")
+    assert not voxels.exists()
 
 
 PUBLISHED = {  # occupied and tower voxels of the published code at 64^3

@@ -10,7 +10,8 @@ import pytest
 
 from scenenet.core.errors import InputError
 from scenenet.pointcloud import read
-from scenenet.synthetic import corridor_cloud, make_corridor, make_survey
+from scenenet.synthetic import SyntheticSettings, corridor_cloud, make_corridor, make_survey
+from scenenet.synthetic.survey import space_needed
 
 
 def test_truth_file_has_the_same_points_in_the_same_order(small, tmp_path):
@@ -41,6 +42,15 @@ def test_summary_counts_what_is_in_the_file(small, tmp_path):
     assert summary["classes"] == dict(zip(codes.tolist(), counts.tolist(), strict=True))
     assert summary["towers"] == len(towers)
     assert summary["mislabelled"] == pytest.approx((truth[cloud.is_tower] != 15).mean(), abs=1e-4)
+
+
+def test_the_estimate_of_space_holds_the_survey_and_is_not_far_above(small, tmp_path):
+    for settings in (small(), SyntheticSettings(towers=3, seed=1)):
+        for name in ("s.laz", "s.las"):
+            make_survey(settings, tmp_path / name)
+            written = (tmp_path / name).stat().st_size
+            estimate = space_needed(make_corridor(settings), tmp_path / name)
+            assert written <= estimate <= 5 * written
 
 
 def test_number_of_workers_does_not_change_the_bytes(small, tmp_path):

@@ -7,11 +7,14 @@ import _job
 
 def predict(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
+    from scenenet.pointcloud import survey_in_metres
     from scenenet.prediction.settings import PredictSettings
-    from scenenet.prediction.writers import PredictionFiles, predict_to_files
+    from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
+    survey = Path(job.input.survey)
+    require_space({survey: survey_in_metres(survey).n_points}, Path(job.output.survey))
     predict_to_files(
-        job.input.survey,
+        survey,
         job.input.model,
         PredictionFiles(*map(Path, (job.output.survey, job.output.towers, job.output.summary))),
         PredictSettings(**job.settings),

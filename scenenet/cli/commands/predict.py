@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -18,9 +17,6 @@ from scenenet.cli.options import (
     detection_settings,
 )
 from scenenet.cli.output import show
-
-if TYPE_CHECKING:
-    from scenenet.pointcloud.reading import SurveyInfo
 
 EXAMPLES = (
     "scenenet predict line.laz --model model.json --out predicted",
@@ -61,7 +57,7 @@ def command(
     from scenenet.models.model_file import read_model
     from scenenet.pointcloud import survey_in_metres
     from scenenet.prediction.settings import PredictSettings
-    from scenenet.prediction.writers import PredictionFiles, predict_to_files
+    from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
     files = [PredictionFiles.of(survey, out) for survey in surveys]
     outputs = [o for f, survey in zip(files, surveys, strict=True) for o in f.outputs(survey)]
@@ -69,7 +65,7 @@ def command(
     read_model(model)[1].threshold()
     failures = Failures()
     seen = failures.look_at(surveys, survey_in_metres)
-    _check_space(seen, out)
+    require_space({survey: info.n_points for survey, info in seen.items()}, out)
     settings = PredictSettings(voxel_size=voxel_size)
     detection = detection_settings(min_conductor)
     summaries = []
@@ -86,18 +82,3 @@ def command(
         ],
     )
     failures.end()
-
-
-def _check_space(surveys: Mapping[Path, SurveyInfo], out: Path) -> None:
-    """Check that the disks have room for all results, and for the temporary files of one survey.
-
-    Raises:
-        OutputError: a disk has too little space.
-    """
-    from scenenet.core.outputs import check_space
-    from scenenet.core.scratch import temporary_directory
-    from scenenet.prediction.writers import space_needed
-
-    needed = [space_needed(survey, info.n_points) for survey, info in surveys.items()]
-    results, scratch = sum(n[0] for n in needed), max((n[1] for n in needed), default=0)
-    check_space({out: results, temporary_directory(): scratch})

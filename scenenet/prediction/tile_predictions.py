@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -24,6 +24,11 @@ if TYPE_CHECKING:
     from scenenet.models.model_file import ModelCard
 
 
+AT_ONCE, MOST_AT_ONCE = 4096, 64
+"""Tiles are predicted together until they have so many voxels, or there are so many of them: a
+survey with points far apart has a thousand tiles of a voxel each."""
+
+
 @dataclass(frozen=True)
 class TilePrediction:
     """The predictions for the occupied voxels of a tile.
@@ -42,12 +47,27 @@ class TilePrediction:
     tower: np.ndarray
 
     def save(self, path: Path) -> None:
-        np.savez(path, **self.__dict__)
+        records = np.empty(len(self.voxel), _record(self.shares.shape[1]))
+        for name in records.dtype.names or ():
+            records[name] = getattr(self, name)
+        path.write_bytes(records.tobytes())  # numpy's own writing hides why the disk refuses
 
     @classmethod
-    def read(cls, path: Path) -> TilePrediction:
-        with np.load(path, allow_pickle=False) as arrays:
-            return cls(**{name: arrays[name] for name in arrays.files})
+    def read(cls, path: Path, n_shares: int) -> TilePrediction:
+        """What ``save`` wrote, with ``n_shares`` GENEOs.
+
+        A survey with points far apart has a thousand tiles of a point each, which an archive of
+        arrays would make slow.
+        """
+        records = np.fromfile(path, _record(n_shares))
+        return cls(**{name: records[name].copy() for name in records.dtype.names or ()})
+
+
+def _record(n_shares: int) -> np.dtype:
+    """A voxel in the file of a tile."""
+    return np.dtype([
+        ("voxel", "<i4"), ("probability", "<f4"), ("shares", "<f4", (n_shares,)), ("tower", "<u4"),
+    ])  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -88,11 +108,12 @@ class TilePredictions:
             # One maximum for the whole survey: one for each tile would show as seams.
             fullest = max((int(tile.count.max()) for tile in self.spool.tiles()), default=1)
         predict = TilePredictor(model, card.measurement, self.spool.voxel_size, fullest)
-        for tile in track(self.spool.tiles(), label, total=len(self.spool)):
-            probability, shares = predict(self.spool, tile)
-            tower = np.zeros(len(tile.voxel), np.uint32)
-            prediction = TilePrediction(tile.voxel, probability, shares, tower)
-            prediction.save(self._path(code_of(tile.place)))
+        for tiles in _together(track(self.spool.tiles(), label, total=len(self.spool))):
+            predicted = predict(self.spool, tiles)
+            for tile, (probability, shares) in zip(tiles, predicted, strict=True):
+                tower = np.zeros(len(tile.voxel), np.uint32)
+                prediction = TilePrediction(tile.voxel, probability, shares, tower)
+                prediction.save(self._path(code_of(tile.place)))
 
     def find_towers(self, tau: float, settings: DetectionSettings) -> list[SurveyTower]:
         """Find the towers of the survey and write the id of each into its voxels."""
@@ -178,10 +199,10 @@ class TilePredictions:
         return points
 
     def _read(self, code: int) -> TilePrediction:
-        return TilePrediction.read(self._path(code))
+        return TilePrediction.read(self._path(code), len(self.geneos))
 
     def _path(self, code: int) -> Path:
-        return self._folder / f"{code}.npz"
+        return self._folder / f"{code}.prediction"
 
 
 class TilePredictor:
@@ -211,8 +232,10 @@ class TilePredictor:
                 kernel, self._bias = self.model.observer()
                 self._kernels = kernel[None]
 
-    def __call__(self, spool: TileSpool, tile: Tile) -> tuple[np.ndarray, np.ndarray]:
-        """Probability (M,) and shares (M, K) at the occupied voxels of a tile.
+    def __call__(
+        self, spool: TileSpool, tiles: Sequence[Tile]
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Probability (M,) and shares (M, K) at the occupied voxels of each tile.
 
         The halo is as wide as the reach of the kernels, so that every voxel gets the value that it
         would have without tiles.
@@ -225,10 +248,15 @@ class TilePredictor:
 
         reach = self.model.reach
         shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
-        scene = spool.around(tile.place, reach)
-        phi = None if self._fullest is None else [(scene.count / self._fullest).astype(np.float32)]
-        occupancy = Occupancy.of_grids([scene.voxel], phi, shape)
-        inner = _inner(scene.voxel, shape, reach)
+        scenes = [spool.around(tile.place, reach) for tile in tiles]
+        phi = None
+        if self._fullest is not None:
+            phi = [(scene.count / self._fullest).astype(np.float32) for scene in scenes]
+        occupancy = Occupancy.of_grids([scene.voxel for scene in scenes], phi, shape)
+        inner = np.concatenate([
+            first + _inner(scene.voxel, shape, reach)
+            for first, scene in zip(occupancy.offsets[:-1], scenes, strict=True)
+        ])  # fmt: skip
         with torch.no_grad():
             parts = convolve_at_voxels(occupancy, self._kernels)
             if isinstance(self.model, GeneoModel):
@@ -241,9 +269,22 @@ class TilePredictor:
             else:
                 observed = parts[0, inner]
                 observed = observed if self._bias is None else observed + self._bias
-                shares = np.empty((len(tile.voxel), 0), np.float32)
+                shares = np.empty((len(inner), 0), np.float32)
             probability = torch.relu(torch.tanh(observed)).numpy()
-        return probability, shares
+        ends = np.cumsum([len(tile.voxel) for tile in tiles])[:-1]
+        return list(zip(np.split(probability, ends), np.split(shares, ends), strict=True))
+
+
+def _together(tiles: Iterable[Tile]) -> Iterator[list[Tile]]:
+    """Groups of tiles that are predicted together."""
+    group: list[Tile] = []
+    for tile in tiles:
+        group.append(tile)
+        if len(group) == MOST_AT_ONCE or sum(len(one.voxel) for one in group) >= AT_ONCE:
+            yield group
+            group = []
+    if group:
+        yield group
 
 
 def _inner(

@@ -23,6 +23,9 @@ BORDER_M = 2.0**-21
 border is often a multiple of the steps of a file, and the sum of offset and steps then lands on
 either side of it by rounding, so that another offset of the same survey would move the point."""
 
+NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)))
+"""(27, 3) steps (z, y, x) from a tile to itself and to the tiles around it."""
+
 _BITS = 21
 _BIAS = 1 << (_BITS - 1)
 _SPOOLED = np.dtype([("voxel", "<i4"), ("count", "<i4")])
@@ -134,8 +137,7 @@ class TileSpool:
         low = np.asarray(place) * EDGE - reach
         shape = np.array([EDGE + 2 * r for r in reach])
         indices, counts = [], []
-        for step in product((-1, 0, 1), repeat=3):
-            code = int(_encode(np.asarray(place)[None] + step)[0])
+        for code in _encode(np.asarray(place) + NEIGHBOURS).tolist():
             if code not in self._codes:
                 continue
             tile = self.tile(code)

@@ -14,8 +14,14 @@ from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
 from scenenet.models.cnn import CNN
 from scenenet.models.scenenet import SceneNet
-from scenenet.prediction.tile_predictions import TilePredictor
-from scenenet.prediction.tiling import EDGE, TileSpool, code_of, groups
+from scenenet.prediction.tile_predictions import (
+    AT_ONCE,
+    MOST_AT_ONCE,
+    TilePrediction,
+    TilePredictor,
+    _together,
+)
+from scenenet.prediction.tiling import EDGE, Tile, TileSpool, code_of, groups
 
 ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])
 
@@ -139,8 +145,12 @@ def seamless(spool: TileSpool, model, measurement: str) -> tuple[np.ndarray, np.
     fullest = max(voxels.values())
     predict = TilePredictor(model, measurement, spool.voxel_size, fullest)
     in_tiles = {}
-    for tile in spool.tiles():
-        probability, _ = predict(spool, tile)
+    tiles = list(spool.tiles())
+    together = predict(spool, tiles)
+    for tile, (probability, shares) in zip(tiles, together, strict=True):
+        ((alone, alone_shares),) = predict(spool, [tile])
+        np.testing.assert_array_equal(probability, alone)
+        np.testing.assert_array_equal(shares, alone_shares)
         in_tiles |= dict(zip(map(tuple, tile.zyx().tolist()), probability.tolist(), strict=True))
     zyx = np.array(list(voxels))
     low = zyx.min(axis=0)
@@ -172,6 +182,34 @@ def test_tiles_give_the_prediction_of_the_whole_survey(tmp_path, model, measurem
     np.testing.assert_allclose(in_tiles, whole, rtol=0, atol=2e-5)
 
 
+def test_tiles_of_few_voxels_are_predicted_together():
+    def tiles(*sizes: int) -> list[Tile]:
+        return [Tile((0, 0, i), np.arange(n, dtype=np.int32), None) for i, n in enumerate(sizes)]
+
+    given = tiles(AT_ONCE, 1, 1, AT_ONCE, *[1] * (MOST_AT_ONCE + 1))
+    together = list(_together(iter(given)))
+    assert [len(group) for group in together] == [1, 3, MOST_AT_ONCE, 1]
+    assert [tile for group in together for tile in group] == given
+    assert list(_together([])) == []
+
+
+@pytest.mark.parametrize("n_shares", [0, 3])
+def test_the_prediction_of_a_tile_is_read_back_as_it_was_saved(tmp_path, n_shares):
+    rng = np.random.default_rng(0)
+    saved = TilePrediction(
+        voxel=np.arange(5, dtype=np.int32),
+        probability=rng.random(5, np.float32),
+        shares=rng.random((5, n_shares), np.float32),
+        tower=np.arange(5, dtype=np.uint32),
+    )
+    saved.save(tmp_path / "tile")
+    back = TilePrediction.read(tmp_path / "tile", n_shares)
+    for name, expected in vars(saved).items():
+        found = getattr(back, name)
+        assert found.dtype == expected.dtype
+        np.testing.assert_array_equal(found, expected)
+
+
 @settings(max_examples=10)
 @given(st.tuples(*[st.integers(-70, 70)] * 3), st.integers(0, 99))
 def test_the_position_of_tiles_has_no_effect(tmp_path_factory, shift, seed):
@@ -184,7 +222,7 @@ def test_the_position_of_tiles_has_no_effect(tmp_path_factory, shift, seed):
         found = {}
         predict = TilePredictor(model, "presence", spool.voxel_size, 1)
         for tile in spool.tiles():
-            probability, _ = predict(spool, tile)
+            ((probability, _),) = predict(spool, [tile])
             found |= dict(zip(map(tuple, tile.zyx().tolist()), probability.tolist(), strict=True))
         predictions.append(found)
     here, there = predictions

@@ -54,7 +54,6 @@ def command(
     The exit code is 1 if a survey fails; the other surveys are still predicted.
     """
     from scenenet.core.outputs import check_outputs
-    from scenenet.models.model_file import read_model
     from scenenet.pointcloud import survey_in_metres
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
@@ -62,9 +61,12 @@ def command(
     files = [PredictionFiles.of(survey, out) for survey in surveys]
     outputs = [o for f, survey in zip(files, surveys, strict=True) for o in f.outputs(survey)]
     check_outputs(outputs, [*surveys, model], overwrite=overwrite)
-    read_model(model)[1].threshold()
     failures = Failures()
     seen = failures.look_at(surveys, survey_in_metres)
+    if seen:  # it loads torch, which takes seconds
+        from scenenet.models.model_file import read_model
+
+        read_model(model)[1].threshold()
     require_space({survey: info.n_points for survey, info in seen.items()}, out)
     settings = PredictSettings(voxel_size=voxel_size)
     detection = detection_settings(min_conductor)

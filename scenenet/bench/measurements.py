@@ -28,6 +28,7 @@ from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import KernelSize, LossSettings
 from scenenet.pointcloud import PointCloud
 from scenenet.training.losses import VoxelWeights, fidelity, negativity
+from scenenet.training.optimiser import Optimiser
 
 SIZES: tuple[KernelSize, ...] = ((9, 9, 9), (9, 5, 5), (12, 5, 5))
 """The thesis' kernel size in training and after tuning, and an even size that is often better."""
@@ -182,7 +183,7 @@ def training_step(samples: list[VoxelSample]) -> dict[str, Any]:
     chosen = [samples[i % len(samples)] for i in range(BATCH)]
     size = (9, 9, 9)
     model = SceneNet(kernel_size=size, generator=torch.Generator().manual_seed(0))
-    optimiser = torch.optim.RMSprop(model.parameters(), lr=1e-4)
+    optimiser = Optimiser("rmsprop", model.parameters())
     n_tower = sum(len(s.tower_index()) for s in chosen)
     weights = VoxelWeights.of_counts(n_tower, BATCH * 64**3, alpha=5.0, epsilon=0.1)
     occupancy, towers = batch(chosen, "presence")
@@ -191,7 +192,7 @@ def training_step(samples: list[VoxelSample]) -> dict[str, Any]:
     def step(error: Callable[[], torch.Tensor]) -> None:
         optimiser.zero_grad()
         (error() + negativity(model, LossSettings())).backward()
-        optimiser.step()
+        optimiser.step(1e-4)
 
     def ours() -> torch.Tensor:
         return fidelity(model, *batch(chosen, "presence"), weights)

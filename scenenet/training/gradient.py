@@ -22,8 +22,7 @@ from scenenet.models.settings import ModelSettings, TrainingSettings
 from scenenet.training.checkpoint import Checkpoint, State
 from scenenet.training.initialisation import starting_model
 from scenenet.training.losses import VoxelWeights, fidelity, negativity
-
-OPTIMISERS = {"rmsprop": torch.optim.RMSprop, "adam": torch.optim.Adam, "sgd": torch.optim.SGD}
+from scenenet.training.optimiser import Optimiser
 
 History = list[dict[str, float]]
 """A row per epoch; the columns are those of ``scenenet.training.train.train``."""
@@ -47,7 +46,7 @@ def fit_by_gradient(
     """
     protocol = settings.training
     model = starting_model(settings, seed, training)
-    optimiser = OPTIMISERS[protocol.optimiser](model.parameters(), lr=protocol.learning_rate)
+    optimiser = Optimiser(protocol.optimiser, model.parameters())
     n_tower = sum(int(sample.tower.sum()) for sample in training)
     n_voxels = sum(sample.grid.n_voxels for sample in training)
     weights = VoxelWeights.of_counts(n_tower, n_voxels, protocol.loss.alpha, protocol.loss.epsilon)
@@ -56,9 +55,8 @@ def fit_by_gradient(
     for epoch in track(range(len(history) + 1, protocol.epochs + 1), label):
         started = time.perf_counter()
         # The rate depends on the epoch alone, so a resumed training continues at the same rate.
-        for group in optimiser.param_groups:
-            group["lr"] = protocol.rate(epoch)
-        row = _epoch(model, optimiser, training, settings, weights, [seed, epoch])
+        rate = protocol.rate(epoch)
+        row = _epoch(model, optimiser, rate, training, settings, weights, [seed, epoch])
         row["seconds"] = time.perf_counter() - started
         if not np.isfinite(row["loss"]) or not all(p.isfinite().all() for p in model.parameters()):
             raise LostTraining(
@@ -76,7 +74,8 @@ def fit_by_gradient(
 
 def _epoch(
     model: VoxelModel,
-    optimiser: torch.optim.Optimizer,
+    optimiser: Optimiser,
+    rate: float,
     training: Sequence[VoxelSample],
     settings: ModelSettings,
     weights: VoxelWeights,
@@ -95,7 +94,7 @@ def _epoch(
         penalty = negativity(model, protocol.loss)
         loss = error + penalty
         loss.backward()
-        optimiser.step()
+        optimiser.step(rate)
         for name, value in zip(sums, (loss, error, penalty), strict=True):
             sums[name] += value.item() * len(chosen)
     return {name: value / len(order) for name, value in sums.items()}
@@ -125,14 +124,14 @@ def _validate(
     }
 
 
-def _state(model: VoxelModel, optimiser: torch.optim.Optimizer, history: History) -> State:
+def _state(model: VoxelModel, optimiser: Optimiser, history: History) -> State:
     tensors = {f"model/{name}": value for name, value in model.state_dict().items()}
-    for number, state in optimiser.state_dict()["state"].items():
+    for number, state in optimiser.state.items():
         tensors |= {f"optimiser/{number}/{key}": value for key, value in state.items()}
     return State({name: value.detach().numpy() for name, value in tensors.items()}, history)
 
 
-def _resume(checkpoint: Checkpoint, model: VoxelModel, optimiser: torch.optim.Optimizer) -> History:
+def _resume(checkpoint: Checkpoint, model: VoxelModel, optimiser: Optimiser) -> History:
     """Load model and optimiser from the checkpoint, and return its history; an empty one if the
     training starts from the beginning."""
     saved = checkpoint.read()
@@ -148,5 +147,5 @@ def _resume(checkpoint: Checkpoint, model: VoxelModel, optimiser: torch.optim.Op
             number, _, key = rest.partition("/")
             state.setdefault(int(number), {})[key] = torch.from_numpy(array)
     model.load_state_dict(weights)
-    optimiser.load_state_dict(optimiser.state_dict() | {"state": state})
+    optimiser.load(state)
     return saved.record

@@ -17,19 +17,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from fixtures.forked import SCENENET, command_line
 
 from scenenet.cli.app import COMMANDS, app
 from scenenet.cli.options import Codes
 from scenenet.pointcloud import SCHEMES
 
+LIMIT_S = 1800
+
 
 def scenenet(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", "from scenenet.cli.app import main; main()", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-    )
+    """A call in a process of its own."""
+    folder = Path.cwd() if cwd is None else cwd
+    return command_line().call(SCENENET, [*map(str, arguments)], folder, os.environ, LIMIT_S)
 
 
 @pytest.fixture(scope="module")
@@ -260,7 +260,7 @@ def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path
     """The signal comes when the survey has been read into temporary files. The process cannot end
     before, however late the signal is: it waits until its progress is read."""
     out = tmp_path / "out"
-    call = [sys.executable, "-c", "from scenenet.cli.app import main; main()", "predict", survey]
+    call = [sys.executable, "-c", SCENENET, "predict", survey]
     reading, writing = full_pipe()
     with subprocess.Popen(
         [*map(str, call), "--model", str(model), "--out", str(out)],

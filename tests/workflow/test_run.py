@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 import shutil
 import sqlite3
 
@@ -23,6 +24,9 @@ STAGES = {
     *("label_noise", "join_runs"),
     *("track", "track_studies", "track_experiment", "register", "report"),
 }
+
+OF_A_CALL = re.compile(r"^(  (Date|Workflow ID|Command): .*|\[.* \d{4}\])$", re.MULTILINE)
+"""Lines that Snakemake shows of each call: dates and the like."""
 
 
 def test_a_run_ends_with_every_result(finished):
@@ -50,6 +54,16 @@ def test_a_run_ends_with_every_result(finished):
 
 def test_a_second_run_has_nothing_to_do(project):
     assert "Nothing to be done" in project.run()
+
+
+def test_a_plan_is_the_one_that_the_command_shows(project):
+    """Tests plan in processes that share the libraries of Snakemake (``fixtures.forked``)."""
+    project.configure({"seeds": [0]})
+    shown = [plan("-n", "--quiet", "host").stdout for plan in (project.snakemake, project.call)]
+    # Snakemake lists some names in any order.
+    one, other = (sorted(re.findall(r"[^\s,]+", OF_A_CALL.sub("", text))) for text in shown)
+    assert len(one) > 500
+    assert one == other
 
 
 def test_the_scores_are_shown_at_the_end(finished):

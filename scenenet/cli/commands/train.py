@@ -90,12 +90,6 @@ def command(
 
     The exit code is 1 if a file fails; the model is trained on the other files.
     """
-    from scenenet.cli.labelled_files import train_files
-    from scenenet.core.files import digest
-    from scenenet.core.outputs import Output, check_outputs
-    from scenenet.core.provenance import package_version
-    from scenenet.models.model_file import is_model_file
-
     ending = ".json" if kind.value == "scenenet" else ".safetensors"
     if out.suffix != ending:
         raise typer.BadParameter(f"a {kind} is written to a {ending} file", param_hint="--out")
@@ -104,6 +98,13 @@ def command(
     except ValueError as error:
         option = "--epochs" if learning_rate is None else "--learning-rate"
         raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None
+    # After the options, so that a wrong one is named at once.
+    from scenenet.cli.labelled_files import train_files
+    from scenenet.core.files import digest
+    from scenenet.core.outputs import Output, check_outputs
+    from scenenet.core.provenance import package_version
+    from scenenet.models.model_file import is_model_file
+
     if validation is None:
         validation = presets.validation_share(kind.value, protocol.value)
     check_outputs([Output(out, is_model_file)], labelled, overwrite=overwrite)

@@ -17,6 +17,7 @@ from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.crop_points import count_crop_points
 from scenenet.evaluation.crop_towers import detect_in_crop, match_crop
 from scenenet.evaluation.points import PointCounts
 from scenenet.evaluation.result import (
@@ -41,11 +42,20 @@ def evaluate(
     split: str | Path,
     detection: DetectionSettings,
     part: str = "test",
+    crop_manifests: Sequence[str | Path] = (),
 ) -> Evaluation:
-    """Scores of a tuned model on one part of the split (see ``score_predictions``)."""
+    """Scores of a tuned model on one part of the split (see ``score_predictions``).
+
+    Args:
+        crop_manifests: of the crop stores, for the scores of points; without them there are none.
+    """
     trained, card = read_model(model)
-    dataset = load(voxel_manifests, crops_in(split, part))
-    return replace(score(trained, card, dataset, detection), part=part)
+    ids = crops_in(split, part)
+    points = None
+    if crop_manifests:
+        points = count_crop_points(model, crop_manifests, ids, detection)
+    dataset = load(voxel_manifests, ids)
+    return replace(score(trained, card, dataset, detection, points), part=part)
 
 
 def score(

@@ -18,6 +18,7 @@ from scenenet.figures import Picture, plan, read_pictures
 from scenenet.metrics.score_columns import PUBLISHED_SCORES, SCORE_COLUMNS
 from scenenet.report.blocks import Block, Column, Figure, Section
 from scenenet.results.folder import Results, read_table
+from scenenet.results.score_tables import TRUTH
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,35 @@ class ReportContext:
     def path(self, name: str) -> Path:
         """The file of a table."""
         return self.results.folder / "tables" / f"{name}.csv"
+
+
+@dataclass(frozen=True)
+class Against:
+    """What scores are measured against.
+
+    Attributes:
+        prefix: beginning of the names of their columns.
+        name: ``truth`` or ``labels``.
+        adjective: of a tower: true or labelled.
+    """
+
+    prefix: str
+    name: str
+    adjective: str
+
+
+AGAINST_TRUTH, AGAINST_LABELS = Against(TRUTH, "truth", "true"), Against("", "labels", "labelled")
+
+
+def against(frame: pd.DataFrame, score: str) -> list[Against]:
+    """What the scores of a table are measured against: first the truth, where it is known.
+
+    Args:
+        frame: with the columns ``truth_SCORE`` and ``SCORE``.
+        score: the score that tells whether the truth is known.
+    """
+    known = f"{TRUTH}{score}" in frame and frame[f"{TRUTH}{score}"].notna().any()
+    return [AGAINST_TRUTH, AGAINST_LABELS] if known else [AGAINST_LABELS]
 
 
 VOXEL_SCORES = [

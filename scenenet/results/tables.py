@@ -21,7 +21,14 @@ from scenenet.metrics.score_columns import SCORES
 from scenenet.results.dataset_tables import classes, towers, voxelisation
 from scenenet.results.folder import Results
 from scenenet.results.model_tables import certificate, parameters, times, turns
-from scenenet.results.score_tables import models, seeds, tower_scores, whole_towers
+from scenenet.results.score_tables import (
+    TRUTH,
+    models,
+    point_scores,
+    seeds,
+    tower_scores,
+    whole_towers,
+)
 from scenenet.results.time_tables import experiment_times, seed_times
 
 
@@ -49,6 +56,7 @@ TABLES: Mapping[str, Table] = {
     "seeds": Table("Scores of each seed", "models", seeds),
     "whole_towers": Table("Voxels at or above tau, and whole towers", "models", whole_towers),
     "tower_scores": Table("Towers found", "models", tower_scores),
+    "point_scores": Table("Points of the towers found", "models", point_scores),
     "times": Table("Times", "models", times, times=True),
     "seed_times": Table("Times of each seed", "models", seed_times, times=True),
     "experiment_times": Table(
@@ -129,7 +137,13 @@ def print_scores(folder: str | Path, dataset: str, grid: str) -> None:
     file = Path(folder) / "tables" / "models.csv"
     if not file.exists():
         return
-    scores = pd.read_csv(file)[["model", "counted", *SCORES]]
-    print(f"\nScores on the test crops of {dataset}, {grid}, tower voxels:")
-    print(scores.to_string(index=False, float_format="%.3f", na_rep="-"))
+    scores = pd.read_csv(file)
+    known = scores[f"{TRUTH}f05"].notna().any()
+    for against, start in (("truth", TRUTH), ("labels", ""))[0 if known else 1 :]:
+        shown = scores[["model", "counted", *(f"{start}{name}" for name in SCORES)]]
+        print(
+            f"\nScores on the test crops of {dataset}, {grid}, tower voxels, against the {against}:"
+        )
+        shown = shown.rename(columns=lambda name: name.removeprefix(TRUTH))
+        print(shown.to_string(index=False, float_format="%.3f", na_rep="-"))
     print(f"Report: {folder}/report/index.html")

@@ -10,7 +10,7 @@ from statistics import fmean, stdev
 from typing import TYPE_CHECKING, Any
 
 from scenenet.core.files import digest
-from scenenet.metrics.score_columns import DECISIVE_FIRST, MATCH_SCORES, SCORES
+from scenenet.metrics.score_columns import DECISIVE_FIRST, MATCH_SCORES, POINT_SCORES, SCORES
 from scenenet.results.folder import BOOSTED_TREES, Results, SeedResult
 from scenenet.tracking.logged_model import ModelRecord
 from scenenet.tracking.run_log import NOTE_TAG, DatasetRecord, RunGroup, RunRecord
@@ -165,6 +165,13 @@ def _final_metrics(result: SeedResult) -> dict[str, float | None]:
     validation = result.validation
     metrics |= {f"validation_{n}": validation[n] for n in DECISIVE_FIRST if n in validation}
     metrics |= {f"towers_{name}": getattr(towers, name) for name in MATCH_SCORES}
+    truth, points = result.evaluation.truth, result.evaluation.points
+    if truth is not None:
+        metrics |= {f"truth_{n}": getattr(truth.voxel, n) for n in DECISIVE_FIRST}
+        metrics |= {f"truth_towers_{name}": getattr(truth.towers, name) for name in MATCH_SCORES}
+    for prefix, found in (("points", points), ("truth_points", truth and truth.points)):
+        if found is not None:
+            metrics |= {f"{prefix}_{name}": getattr(found, name) for name in POINT_SCORES}
     metrics |= {"tau": test.tau, "alive": float(result.alive)}
     return metrics
 

@@ -94,6 +94,17 @@ def source_print(survey):
         return "unreadable"  # its own jobs fail and say why, and no other
 
 
+def truth_of(survey):
+    """The file with the true classes of a survey, in a list; an empty one for a recorded survey."""
+    path = Path(SURVEYS[survey].path)
+    return [str(path.with_suffix(".truth.laz"))] if SURVEYS[survey].origin == "synthetic" else []
+
+
+def source_prints(survey):
+    """What identifies a survey and its truth, which one recipe makes."""
+    return dict.fromkeys(("survey", "truth"), source_print(survey))
+
+
 def synthetic_settings(name):
     return settings.synthetic_named(name).model_dump(mode="json")
 

@@ -4,8 +4,10 @@
 rule towers:
     input:
         survey=lambda w: source(w.survey),
+        truth=lambda w: truth_of(w.survey),
     output:
         towers=f"{R}/towers/{{survey}}/towers.csv",
+        true_towers=f"{R}/towers/{{survey}}/true_towers.csv",
         left_out=f"{R}/towers/{{survey}}/left_out.csv",
         provenance=f"{R}/towers/{{survey}}/provenance.json",
     log:
@@ -25,7 +27,7 @@ rule towers:
             "towers",
             SETTINGS["towers"],
             codes=SURVEYS[w.survey].codes,
-            input={"survey": source_print(w.survey)},
+            input=source_prints(w.survey),
         ),
     message:
         "Finding the labelled towers of {wildcards.survey}"
@@ -36,7 +38,9 @@ rule towers:
 rule crops:
     input:
         survey=lambda w: source(w.survey),
+        truth=lambda w: truth_of(w.survey),
         towers=f"{R}/towers/{{survey}}/towers.csv",
+        true_towers=f"{R}/towers/{{survey}}/true_towers.csv",
         towers_record=f"{R}/towers/{{survey}}/provenance.json",
     output:
         store=f"{R}/crops/{{survey}}/crops.zarr.zip",
@@ -60,7 +64,7 @@ rule crops:
             SETTINGS["crops"],
             survey=w.survey,
             codes=SURVEYS[w.survey].codes,
-            input={"survey": source_print(w.survey)},
+            input=source_prints(w.survey),
         ),
     message:
         "Cropping {wildcards.survey} around its towers"

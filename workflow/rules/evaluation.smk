@@ -6,6 +6,8 @@ rule evaluate:
         model=lambda w: tuned_file(w.model, w.seed),
         stores=every("voxels", "store"),
         manifests=every("voxels", "manifest"),
+        crop_stores=every("crops", "store"),
+        crops=every("crops", "manifest"),
         split=f"{R}/split/split.csv",
     output:
         scores=f"{R}/evaluate/{{model}}/seed-{{seed}}.json",

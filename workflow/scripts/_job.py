@@ -28,7 +28,7 @@ THREAD_VARIABLES = (
 )
 
 
-NOT_RECORDED = ("store", "stores", "towers_record")
+NOT_RECORDED = ("store", "stores", "crop_stores", "towers_record")
 """Inputs without a fingerprint in the record: the manifests of stores have a digest of them, and
 the record of the labelled towers stands beside their table, which has one."""
 

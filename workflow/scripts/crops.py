@@ -4,10 +4,14 @@ import _job
 
 
 def crops(job: _job.Job) -> None:
+    from pathlib import Path
+
     import pandas as pd
 
-    from scenenet.dataset.crops import CropSettings, cut_crops
+    from scenenet.dataset.crops import CropSettings, Truth, cut_crops
 
+    true_towers = pd.read_csv(job.input.true_towers, dtype={"sample": str})
+    truth = [Truth(Path(path), true_towers) for path in job.input.truth]
     cut_crops(
         job.identity["survey"],
         job.input.survey,
@@ -16,6 +20,7 @@ def crops(job: _job.Job) -> None:
         CropSettings(**job.settings),
         job.output.store,
         job.output.manifest,
+        truth[0] if truth else None,
     )
 
 

@@ -14,6 +14,7 @@ def evaluate(job: _job.Job) -> None:
         job.input.split,
         DetectionSettings(**job.settings),
         part=job.identity["part"],
+        crop_manifests=job.input.crops,
     )
     write_json(job.output.scores, scores.to_json())
 

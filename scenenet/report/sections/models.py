@@ -2,14 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
+import pandas as pd
+
+from scenenet.experiments.label_noise.settings import LABELS
 from scenenet.metrics.score_columns import (
     AT_TAU,
     MATCH_COLUMNS,
+    POINT_COLUMNS,
     SCORE_COLUMNS,
     WHOLE_TOWERS,
+    MatchColumn,
 )
-from scenenet.report.blocks import Block, Column, Section, table
-from scenenet.report.context import VOXEL_SCORES, ReportContext, with_published
+from scenenet.report.blocks import Block, Column, Section, Text, table
+from scenenet.report.context import (
+    AGAINST_TRUTH,
+    VOXEL_SCORES,
+    Against,
+    ReportContext,
+    against,
+    with_published,
+)
 from scenenet.results.score_tables import TRIVIAL
 
 
@@ -18,83 +33,165 @@ def models(context: ReportContext) -> Section | None:
     frame = context.table("models")
     if frame is None:
         return None
+    measured = against(frame, "f05")
+    blocks: list[Block] = []
+    if AGAINST_TRUTH in measured:
+        blocks.append(
+            Text(
+                "Annotators label the surroundings of a tower as tower. The labels of these "
+                "surveys say how well a model agrees with annotators, the truth says how well it "
+                "finds towers. Models are trained and tuned on labels alone; scores against the "
+                "truth come first, over the test crops whose truth is known."
+            )
+        )
+    blocks += [_scores(frame, one) for one in measured]
+    blocks += _whole_towers(context)
+    blocks += context.figures("models")
+    seeds = context.table("seeds")
+    if seeds is not None:
+        blocks.append(_each_seed(seeds, measured))
+    return Section("models", "Scores of the models", blocks)
+
+
+def _scores(frame: pd.DataFrame, measured: Against) -> Block:
     columns = [
         Column("model", "model"),
         Column("counted", "trainings"),
         Column("voxels", "voxels that count"),
         Column("parameters", "parameters", "count"),
-        *with_published(VOXEL_SCORES),
     ]
+    if measured is AGAINST_TRUTH:
+        columns += [_against(column, measured) for column in VOXEL_SCORES]
+        caption = (
+            "Against the truth: scores of the tower class over all voxels of the test crops, at "
+            "the tau chosen on the labels of the validation crops, mean ± standard deviation over "
+            f"seeds. “{TRIVIAL}” is a model that never predicts tower."
+        )
+        return table(frame, columns, caption, "tables/models.csv")
+    columns += with_published(VOXEL_SCORES)
     caption = (
-        "Scores of the tower class over all voxels of the test crops, at the tau chosen on the "
-        "validation crops, mean ± standard deviation over seeds, with the scores of thesis Table "
-        "5.3. The mean IoU is over background and tower, as in the thesis. The thesis used other "
+        "Against the labels: scores of the tower class over all voxels of the test crops, at the "
+        "tau chosen on the validation crops, mean ± standard deviation over seeds, with the scores "
+        "of thesis Table 5.3. The mean IoU is over background and tower, as in the thesis. The thesis used other "
         "data and reports live models only, so compare the order of the models and not the digits. "
         "“Voxels that count” are those at or above tau, as in the thesis, or those of whole towers "
         f"that are found with them; the next table has both for every model. “{TRIVIAL}” is a "
         f"model that never predicts tower."
     )
-    seeds = context.table("seeds")
-    blocks: list[Block] = [table(frame, columns, caption, "tables/models.csv")]
-    blocks += _whole_towers(context)
-    blocks += context.figures("models")
-    if seeds is not None:
-        columns = [
-            Column("model", "model"),
-            Column("seed", "seed", "count"),
-            Column("alive", "live", "yes"),
-            Column("tau", "tau", "score"),
-            Column("validation_f05", "F0.5, validation", "score"),
-            *(Column(c.name, c.label, "score") for c in VOXEL_SCORES),
-            Column("average_precision", "average precision", "score"),
-        ]
-        caption = "Every single training: scores on the test crops at the tau chosen on the "
-        "validation crops. A live model detects at least one tower voxel."
-        blocks.append(table(seeds, columns, caption, "tables/seeds.csv", folded=True))
-    return Section("models", "Scores of the models", blocks)
+    return table(frame, columns, caption, "tables/models.csv")
+
+
+def _each_seed(seeds: pd.DataFrame, measured: Sequence[Against]) -> Block:
+    scores = [
+        *(Column(c.name, c.label, "score") for c in VOXEL_SCORES),
+        Column("average_precision", "average precision", "score"),
+    ]
+    columns = [
+        Column("model", "model"),
+        Column("seed", "seed", "count"),
+        Column("alive", "live", "yes"),
+        Column("tau", "tau", "score"),
+        Column("validation_f05", "F0.5, validation", "score"),
+        *_against_each(scores, measured),
+    ]
+    caption = (
+        "Every single training: scores on the test crops at the tau chosen on the validation "
+        "crops. A live model detects at least one voxel labelled tower."
+    )
+    return table(seeds, columns, caption, "tables/seeds.csv", folded=True)
+
+
+def _against_each(columns: Sequence[Column], measured: Sequence[Against]) -> list[Column]:
+    """Columns for each of what they are measured against, which their headings name if it is more
+    than the labels."""
+    if len(measured) == 1:
+        return list(columns)
+    return [_against(column, one, one.name) for one in measured for column in columns]
+
+
+def _against(column: Column, measured: Against, named: str = "") -> Column:
+    """The column with the same score against something, which the heading names."""
+    return replace(
+        column,
+        name=f"{measured.prefix}{column.name}",
+        label=f"{column.label} ({named})" if named else column.label,
+        spread=None if column.spread is None else f"{measured.prefix}{column.spread}",
+    )
 
 
 def _whole_towers(context: ReportContext) -> list[Block]:
     frame = context.table("whole_towers")
     if frame is None:
         return []
-    columns = [Column("model", "model")]
-    for part, voxels in (("tau", AT_TAU), ("towers", WHOLE_TOWERS)):
-        columns += [
-            Column(f"{part}_{c.name}", f"{c.short}, {voxels}", "score2", f"{part}_{c.name}_std")
-            for c in SCORE_COLUMNS
-            if c.tower_only
-        ]
+    scores = [
+        Column(f"{part}_{c.name}", f"{c.short}, {voxels}", "score2", f"{part}_{c.name}_std")
+        for part, voxels in (("tau", AT_TAU), ("towers", WHOLE_TOWERS))
+        for c in SCORE_COLUMNS
+        if c.tower_only
+    ]
+    return [_both_ways(frame, scores, one) for one in against(frame, "tau_f05")]
+
+
+def _both_ways(frame: pd.DataFrame, scores: Sequence[Column], measured: Against) -> Block:
+    columns = [Column("model", "model"), *(_against(column, measured) for column in scores)]
     caption = (
-        "The same predictions on the same test crops, counted in two ways: the voxels at or above "
+        f"Against the {measured.name}: "
+        "the same predictions on the same test crops, counted in two ways: the voxels at or above "
         "tau, as in the thesis, and the voxels of whole towers. A whole tower is accepted by its "
         "height, its body and its conductors, and all of its body counts. The rules are the same "
         "for every model, and nothing in them is trained (docs/method/detection.md). Mean ± "
         "standard deviation over seeds."
     )
-    return [table(frame, columns, caption, "tables/whole_towers.csv")]
+    return table(frame, columns, caption, "tables/whole_towers.csv")
 
 
 def positions(context: ReportContext) -> Section | None:
-    """Tower positions in metres (thesis 5.2.4)."""
+    """Tower positions in metres (thesis 5.2.4), and the points of towers."""
     frame = context.table("tower_scores")
     if frame is None:
         return None
-    columns = [
-        Column("model", "model"),
-        Column("counted", "trainings"),
-        *(
-            Column(c.name, c.label, c.kind, None if c.kind == "count" else f"{c.name}_std")
-            for c in MATCH_COLUMNS
-        ),
-    ]
-    caption = (
-        "Towers as objects on the test crops: a predicted tower within 5 m of a labelled one is a "
-        "hit. Every crop has a tower at its centre, which is easier than a whole survey. The "
-        "thesis does not report these scores."
-    )
-    found = table(frame, columns, caption, "tables/tower_scores.csv")
-    return Section("positions", "Towers found", [found])
+    blocks: list[Block] = []
+    for measured in against(frame, "n_true"):
+        caption = (
+            f"Towers as objects on the test crops: a predicted tower within 5 m of a "
+            f"{measured.adjective} one is a hit. Every crop has a labelled tower at its centre, "
+            "which is easier than a whole survey. Height and base are compared with the highest "
+            f"{measured.adjective} point and with the ground under the axis. The thesis does not "
+            "report these scores."
+        )
+        columns = _of_matches(MATCH_COLUMNS, measured)
+        blocks.append(table(frame, columns, caption, "tables/tower_scores.csv"))
+    blocks += _points(context)
+    return Section("positions", "Towers found", blocks)
+
+
+def _points(context: ReportContext) -> list[Block]:
+    points = context.table("point_scores")
+    if points is None:
+        return []
+    blocks: list[Block] = []
+    for measured in against(points, "n_true"):
+        if points[f"{measured.prefix}n_true"].isna().all():
+            continue
+        caption = (
+            f"Points of the test crops with a tower id, as in a classified survey, against the "
+            f"{measured.adjective} tower points. Each crop is predicted as a survey of its own."
+        )
+        if measured is AGAINST_TRUTH:
+            caption += f" The row “{LABELS}” scores the labels as if a model had predicted them."
+        shown = points[points[f"{measured.prefix}n_true"].notna()]
+        columns = _of_matches(POINT_COLUMNS, measured)
+        blocks.append(table(shown, columns, caption, "tables/point_scores.csv"))
+    return blocks
+
+
+def _of_matches(scores: Sequence[MatchColumn], measured: Against) -> list[Column]:
+    columns = [Column("model", "model"), Column("counted", "trainings")]
+    for c in scores:
+        label = c.label.replace("labelled", measured.adjective)
+        spread = None if c.kind == "count" else f"{c.name}_std"
+        columns.append(_against(Column(c.name, label, c.kind, spread), measured))
+    return columns
 
 
 def training(context: ReportContext) -> Section | None:

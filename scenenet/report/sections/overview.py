@@ -15,7 +15,7 @@ from scenenet.metrics.score_columns import (
     score_text,
 )
 from scenenet.report.blocks import Block, Facts, Section, Text, write
-from scenenet.report.context import ReportContext
+from scenenet.report.context import Against, ReportContext, against
 from scenenet.results.folder import BOOSTED_TREES
 from scenenet.results.score_tables import TRIVIAL
 
@@ -33,17 +33,22 @@ def overview(context: ReportContext) -> Section:
     facts: list[tuple[str, str]] = []
     blocks: list[Block] = [Text("No model has been evaluated in this run.")]
     if models is not None:
+        measured = against(models, "f05")[0]
         first = _representative(models, results.predicting or models["model"].iloc[0])
         others = [
             _representative(models, name)
             for name in dict.fromkeys([*results.models, BOOSTED_TREES])
             if name != first["model"] and (models["model"] == name).any()
         ]
-        blocks = [Text(_task(context, first)), Text(_headline(context, first))]
-        blocks += [Text(_comparison(context, other, first)) for other in others]
+        blocks = [Text(_task(context, first)), Text(_headline(context, first, measured))]
+        blocks += [Text(_comparison(context, other, first, measured)) for other in others]
         blocks.append(Text(_terms(models)))
+        known = f", against the {measured.name}" if measured.prefix else ""
         facts = [
-            (f"{column.label} of {first['model']}", write(first[column.name], "score"))
+            (
+                f"{column.label} of {first['model']}{known}",
+                write(first[f"{measured.prefix}{column.name}"], "score"),
+            )
             for column in SCORE_COLUMNS
             if column.tower_only
         ]
@@ -72,28 +77,46 @@ def _task(context: ReportContext, first: Mapping[Any, Any]) -> str:
     )
 
 
-def _headline(context: ReportContext, first: Mapping[Any, Any]) -> str:
+def _headline(context: ReportContext, first: Mapping[Any, Any], measured: Against) -> str:
+    precision, recall = (_share(first[f"{measured.prefix}{n}"]) for n in ("precision", "recall"))
+    labelled, of_labels = "labelled tower", ""
+    if measured.prefix:
+        labelled = "tower in truth"
+        precise, complete = _share(first["precision"]), _share(first["recall"])
+        of_labels = (
+            f" Against the labels, whose annotators include the surroundings of a tower, they are "
+            f"{precise} and {complete}."
+        )
     return (
         f"{first['model']}, {_kind(context, first)}, classifies the new surveys. Of the voxels it "
-        f"predicts as tower, {_share(first['precision'])} are labelled tower (precision); it finds "
-        f"{_share(first['recall'])} of the labelled tower voxels (recall). These numbers are for "
-        f"{_seeds(first)}; they count {_counted(first)}."
+        f"predicts as tower, {precision} are {labelled} (precision); it finds {recall} of the "
+        f"{measured.adjective} tower voxels (recall). These numbers are for "
+        f"{_seeds(first)}; they count {_counted(first)}.{of_labels}"
     )
 
 
-def _comparison(context: ReportContext, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
+def _comparison(
+    context: ReportContext,
+    other: Mapping[Any, Any],
+    first: Mapping[Any, Any],
+    measured: Against,
+) -> str:
     """The scores of another model, compared with the first one counted in the same way."""
-    scores = (
-        f"{other['model']}, {_kind(context, other)}: precision {score_text(other['precision'])}, "
-        f"recall {score_text(other['recall'])} ({_seeds(other)}; {_counted(other)})."
+    precision, recall, f05 = (
+        other[f"{measured.prefix}{name}"] for name in ("precision", "recall", "f05")
     )
-    if pd.isna(other["f05"]) or pd.isna(first["f05"]):
+    reference = first[f"{measured.prefix}f05"]
+    scores = (
+        f"{other['model']}, {_kind(context, other)}: precision {score_text(precision)}, "
+        f"recall {score_text(recall)} ({_seeds(other)}; {_counted(other)})."
+    )
+    if pd.isna(f05) or pd.isna(reference):
         return scores
-    if not other["recall"]:
+    if not recall:
         return f"{scores} It detects no tower voxel."
     if other["voxels"] == first["voxels"]:
-        return f"{scores} {_difference(other['f05'], first['f05'], str(first['model']))}"
-    return f"{scores}{_same_way(context, other, first)}"
+        return f"{scores} {_difference(f05, reference, str(first['model']))}"
+    return f"{scores}{_same_way(context, other, first, measured)}"
 
 
 def _difference(other: float, first: float, name: str) -> str:
@@ -105,7 +128,12 @@ def _difference(other: float, first: float, name: str) -> str:
     return f"F0.5 {other:.2f}, {verdict}."
 
 
-def _same_way(context: ReportContext, other: Mapping[Any, Any], first: Mapping[Any, Any]) -> str:
+def _same_way(
+    context: ReportContext,
+    other: Mapping[Any, Any],
+    first: Mapping[Any, Any],
+    measured: Against,
+) -> str:
     """Both models scored the same way, if their own ways differ."""
     frame = context.table("whole_towers")
     if frame is None:
@@ -114,7 +142,8 @@ def _same_way(context: ReportContext, other: Mapping[Any, Any], first: Mapping[A
     seeds = int(rows.loc[first["model"], "n_seeds"])
     pairs = []
     for voxels in reversed(VOXELS):
-        ours, reference = (rows.loc[row["model"], f"{PARTS[voxels]}_f05"] for row in (other, first))
+        column = f"{measured.prefix}{PARTS[voxels]}_f05"
+        ours, reference = (rows.loc[row["model"], column] for row in (other, first))
         pairs.append(
             f"{score_text(ours)} against {score_text(reference)} for {first['model']} ({voxels})"
         )

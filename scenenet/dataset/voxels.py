@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -173,6 +173,10 @@ class VoxelSample:
         true = np.zeros(self.grid.n_voxels, bool)
         true[self.index[self.true]] = True
         return true
+
+    def labelled_by_truth(self) -> VoxelSample | None:
+        """The same voxels with the truth as their labels; None where it is not known."""
+        return None if self.true is None else replace(self, tower=self.true)
 
     def tower_index(self) -> np.ndarray:
         """(T,) flat positions of the tower voxels."""

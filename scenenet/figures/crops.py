@@ -43,7 +43,7 @@ def draw_crop(results: Results, reference: str, rank: str, out: Path) -> tuple[s
     shown = [replace(view, values=view.values[keep]) for view in views]
     return side_views(cloud.xyz[keep], shown, out), (
         f"Crop {sample.id}: the {rank} of {len(chosen_by.evaluation.per_sample)} test crops "
-        f"by F0.5 of {reference} (F0.5 {score_text(sample.f05)}, precision "
+        f"by F0.5 of {reference} against the labels (F0.5 {score_text(sample.f05)}, precision "
         f"{score_text(sample.precision)}, recall {score_text(sample.recall)}"
         f"{_counted(chosen_by, sample)}). Points have the probability of their voxel; each model "
         "is its best seed on validation. Compare thesis Figures 5.8 and 5.9."

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from scenenet.experiments.cross_validation.summary import summarise_folds
+from scenenet.experiments.cross_validation.summary import leading, summarise_folds
 from scenenet.experiments.label_noise.summary import summarise_label_noise
 from scenenet.figures.plots.experiments import cross_validation, label_noise
 
@@ -30,7 +30,9 @@ def draw_cross_validation(runs: pd.DataFrame, out: Path) -> tuple[str, str]:
     row = summarise_folds(runs).iloc[0]
     return cross_validation(runs, out), (
         f"Cross-validation over {row['crops']} crops in {row['n_folds']} folds: models are tested "
-        "on one fold, trained and tuned on the others. Points: mean over the folds. Bars: standard "
+        "on one fold, trained and tuned on the others; scores are against "
+        f"{'the truth' if leading(runs) else 'the labels'}. Points: mean over the folds. Bars: "
+        "standard "
         f"deviation of that mean over {row['n_seeds']} seeds. Ticks: F0.5 of each fold, mean over "
         "seeds."
     )

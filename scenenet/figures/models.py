@@ -25,10 +25,11 @@ def draw_curves(results: Results, thesis: Thesis | None, out: Path) -> tuple[str
 
     # Without labelled voxels there is no recall, and no curve.
     scored = {
-        model: [r.evaluation for r in results.of_model(model)
-                if r.evaluation.average_precision is not None]
+        model: [r.evaluation.leading for r in results.of_model(model)
+                if r.evaluation.leading.average_precision is not None]
         for model in results.models
     }  # fmt: skip
+    against = "truth" if any(r.evaluation.truth for r in results.trained) else "labels"
     curves = {model: [one.pr_curve for one in of] for model, of in scored.items() if of}
     published = {}
     for model, kind in results.models.items():
@@ -38,10 +39,11 @@ def draw_curves(results: Results, thesis: Thesis | None, out: Path) -> tuple[str
         if recall is not None and precision is not None:
             published[model] = (recall, precision)
     return precision_recall(curves, out, published), (
-        "Precision and recall over all voxels of the test crops, for every threshold tau. Thin "
-        "lines: single seeds. Thick line: their mean, with one standard deviation; a seed that "
-        "does not reach a recall counts with precision 0 there. Diamonds: scores of the thesis "
-        "(Table 5.3), measured on other data. Compare thesis Figure 5.7."
+        "Precision and recall over all voxels of the test crops, against the "
+        f"{against}, for every threshold tau. Thin lines: single seeds. Thick line: their mean, "
+        "with one standard deviation; a seed that does not reach a recall counts with precision 0 "
+        "there. Diamonds: scores of the thesis (Table 5.3), measured on other data. Compare thesis "
+        "Figure 5.7."
     )
 
 

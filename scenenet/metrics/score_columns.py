@@ -218,6 +218,9 @@ POINT_COLUMNS = (
 
 POINT_SCORES = tuple(column.name for column in POINT_COLUMNS)
 
+TRUTH = "truth_"
+"""Beginning of the columns with scores against the truth; the others are against the labels."""
+
 AT_TAU = "at or above tau"
 """Voxels count as detected if their probability is at or above tau, as in the thesis."""
 WHOLE_TOWERS = "whole towers"

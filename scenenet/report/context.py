@@ -7,7 +7,7 @@ results for it. ``scenenet.report.page`` has their order.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -15,10 +15,9 @@ import pandas as pd
 
 from scenenet.experiments.published import Thesis
 from scenenet.figures import Picture, plan, read_pictures
-from scenenet.metrics.score_columns import PUBLISHED_SCORES, SCORE_COLUMNS
+from scenenet.metrics.score_columns import PUBLISHED_SCORES, SCORE_COLUMNS, TRUTH
 from scenenet.report.blocks import Block, Column, Figure, Section
 from scenenet.results.folder import Results, read_table
-from scenenet.results.score_tables import TRUTH
 
 
 @dataclass(frozen=True)
@@ -89,6 +88,24 @@ def against(frame: pd.DataFrame, score: str) -> list[Against]:
     """
     known = f"{TRUTH}{score}" in frame and frame[f"{TRUTH}{score}"].notna().any()
     return [AGAINST_TRUTH, AGAINST_LABELS] if known else [AGAINST_LABELS]
+
+
+def against_each(columns: Sequence[Column], measured: Sequence[Against]) -> list[Column]:
+    """Columns for each of what they are measured against, which their headings name if it is more
+    than the labels."""
+    if len(measured) == 1:
+        return list(columns)
+    return [against_column(column, one, one.name) for one in measured for column in columns]
+
+
+def against_column(column: Column, measured: Against, named: str = "") -> Column:
+    """The column with the same score against something, which the heading names."""
+    return replace(
+        column,
+        name=f"{measured.prefix}{column.name}",
+        label=f"{column.label} ({named})" if named else column.label,
+        spread=None if column.spread is None else f"{measured.prefix}{column.spread}",
+    )
 
 
 VOXEL_SCORES = [

@@ -20,15 +20,13 @@ from scenenet.metrics.score_columns import (
     PUBLISHED_SCORES,
     SCORES,
     TOWER_ONLY_SCORES,
+    TRUTH,
     WHOLE_TOWERS,
 )
 from scenenet.results.folder import BOOSTED_TREES, Results, SeedResult
 
 TRIVIAL = "nothing detected"
 """Name of the trivial baseline, a model that never predicts tower."""
-
-TRUTH = "truth_"
-"""Beginning of the columns with scores against the truth."""
 
 
 def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:

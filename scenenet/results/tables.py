@@ -17,12 +17,11 @@ from scenenet.core.files import atomic, digest, sha256
 from scenenet.experiments.published import Thesis
 from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.experiments.studies.summary import summarise
-from scenenet.metrics.score_columns import SCORES
+from scenenet.metrics.score_columns import SCORES, TRUTH
 from scenenet.results.dataset_tables import classes, towers, voxelisation
 from scenenet.results.folder import Results
 from scenenet.results.model_tables import certificate, parameters, times, turns
 from scenenet.results.score_tables import (
-    TRUTH,
     models,
     point_scores,
     seeds,

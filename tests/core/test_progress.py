@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenenet.core import progress
-from scenenet.core.progress import track
+from scenenet.core.progress import quiet, track
 
 
 def test_items_pass_through_and_a_log_gets_a_last_line(capsys):
@@ -17,6 +17,13 @@ def test_a_log_gets_a_line_at_each_interval(capsys, monkeypatch):
     monkeypatch.setattr(progress, "LOG_INTERVAL_S", 0.0)
     list(track([1, 2], "crops"))
     assert capsys.readouterr().err.splitlines() == ["crops: 1/2", "crops: 2/2", "crops: done (2)"]
+
+
+def test_a_step_of_other_work_reports_no_progress(capsys):
+    for _ in track("ab", "crops"):
+        with quiet():
+            assert list(track([1, 2], "tiles")) == [1, 2]
+    assert capsys.readouterr().err == "crops: done (2)\n"
 
 
 def test_an_empty_iterable_yields_nothing():

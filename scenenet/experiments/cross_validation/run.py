@@ -7,6 +7,7 @@ tau is chosen on the training crops of the fold; nothing is chosen on the crops 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,14 +17,17 @@ from scenenet.core.progress import track
 from scenenet.dataset.folds import folds
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.detection.settings import DetectionSettings
+from scenenet.experiments.cross_validation.summary import COUNTS
 from scenenet.experiments.run_tables import write_runs
 from scenenet.experiments.train_and_tune import train_and_tune
-from scenenet.metrics.score_columns import AT_TAU, SCORES, WHOLE_TOWERS
+from scenenet.metrics.score_columns import AT_TAU, SCORES, TRUTH, WHOLE_TOWERS
+from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
 
 COLUMNS = (
-    "model", "voxels", "seed", "fold", "crops", "training_crops", "alive", "tau", *SCORES,
-    "tp", "fp", "fn", "tn", "training_f05", "parameters",
+    "model", "voxels", "seed", "fold", "crops", "training_crops", "alive", "tau",
+    *(f"{TRUTH}{name}" for name in (*SCORES, *COUNTS)), *SCORES, *COUNTS,
+    "training_f05", "parameters",
 )  # fmt: skip
 
 
@@ -40,7 +44,8 @@ def cross_validate(
     """Train one model from every seed on every fold and score it on the crops left out.
 
     There are two rows per training (column ``voxels``): one counts the voxels at or above tau, the
-    other the voxels of whole towers.
+    other the voxels of whole towers. Crops whose truth is known are scored against it as well;
+    models are trained and tau is chosen on labels alone.
 
     Args:
         voxel_manifests: of the voxel stores.
@@ -89,12 +94,22 @@ def run_folds(
             "parameters": tuned.parameters,
             "training_seconds": tuned.seconds,
         }
-        counted = {
-            AT_TAU: tuned.score(left_out),
-            WHOLE_TOWERS: tuned.score_towers(left_out, detection),
-        }
-        for voxels, counts in counted.items():
-            cells = {part: getattr(counts, part) for part in ("tp", "fp", "fn", "tn")}
+        true = [one for s in left_out if (one := s.labelled_by_truth()) is not None]
+        for voxels, count in (
+            (AT_TAU, tuned.score),
+            (WHOLE_TOWERS, partial(tuned.score_towers, detection=detection)),
+        ):
+            counts = count(left_out)
             own = {"voxels": voxels, "alive": counts.tp > 0}
-            rows.append(shared | own | counts.scores() | cells)
+            rows.append(
+                shared | own | _cells(count(true) if true else None, TRUTH) | _cells(counts)
+            )
     return rows
+
+
+def _cells(counts: Confusion | None, start: str = "") -> dict[str, float | None]:
+    """The columns of counts and their scores, whose names begin with ``start``; empty for None."""
+    if counts is None:
+        return {f"{start}{name}": None for name in (*SCORES, *COUNTS)}
+    cells = counts.scores() | {name: getattr(counts, name) for name in COUNTS}
+    return {f"{start}{name}": value for name, value in cells.items()}

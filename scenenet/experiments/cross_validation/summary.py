@@ -7,7 +7,14 @@ from typing import Any
 
 import pandas as pd
 
-from scenenet.metrics.score_columns import AT_TAU, DECISIVE, SCORES, score_column, score_text
+from scenenet.metrics.score_columns import (
+    AT_TAU,
+    DECISIVE,
+    SCORES,
+    TRUTH,
+    score_column,
+    score_text,
+)
 from scenenet.metrics.voxel_scores import Confusion
 
 COUNTS = ("tp", "fp", "fn", "tn")
@@ -26,11 +33,11 @@ def summarise_folds(runs: pd.DataFrame) -> pd.DataFrame:
         model, voxels, n_seeds, n_folds, crops; live_share of the trainings; each score as the mean
         over folds and seeds, and its spread ``_std``: the standard deviation over seeds of the mean
         over folds; ``pooled_`` scores of the counts of all folds together, mean over seeds, with
-        their ``_std``; worst_fold_f05, best_fold_f05: means over seeds; parameters.
+        their ``_std``; worst_fold_f05, best_fold_f05: means over seeds; parameters. Scores against
+        the truth, where it is known, have names that begin with ``TRUTH`` and come first.
     """
     rows = []
     for (model, voxels), group in runs.groupby(list(CASE), sort=False):
-        by_seed = group.groupby("seed")
         row: dict[str, Any] = {
             "model": model,
             "voxels": voxels,
@@ -39,19 +46,48 @@ def summarise_folds(runs: pd.DataFrame) -> pd.DataFrame:
             "crops": sum(len(crops.split()) for crops in group.groupby("fold")["crops"].first()),
             "live_share": group["alive"].astype(float).mean(),
         }
-        for name in SCORES:
-            means = by_seed[name].mean()
-            row |= {name: means.mean(), f"{name}_std": means.std()}
-        pooled = pd.DataFrame(
-            [Confusion(*counts).scores() for counts in by_seed[list(COUNTS)].sum().to_numpy()]
-        )
-        for name in SCORES:
-            row |= {f"pooled_{name}": pooled[name].mean(), f"pooled_{name}_std": pooled[name].std()}
-        of_folds = group.groupby("fold")["f05"].mean()
-        row |= {"worst_fold_f05": of_folds.min(), "best_fold_f05": of_folds.max()}
+        for against in (TRUTH, ""):
+            row |= {f"{against}{name}": value for name, value in _scores(group, against).items()}
         row["parameters"] = group["parameters"].mean()
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _scores(group: pd.DataFrame, against: str) -> dict[str, float]:
+    """The scores of a row of the table against the truth or against the labels.
+
+    Args:
+        group: the runs of the row.
+        against: beginning of the names of their columns.
+    """
+    row: dict[str, float] = {}
+    names = [f"{against}{name}" for name in (*SCORES, *COUNTS)]
+    runs = group[["seed", "fold"]].assign(
+        **{name: group[column].astype(float) for name, column in
+           zip((*SCORES, *COUNTS), names, strict=True)}
+    )  # fmt: skip
+    by_seed = runs.groupby("seed")
+    for name in SCORES:
+        means = by_seed[name].mean()
+        row |= {name: means.mean(), f"{name}_std": means.std()}
+    pooled = pd.DataFrame(
+        [Confusion(*counts).scores() for counts in by_seed[list(COUNTS)].sum().to_numpy()],
+        columns=list(SCORES),
+        dtype=float,
+    )
+    for name in SCORES:
+        row |= {f"pooled_{name}": pooled[name].mean(), f"pooled_{name}_std": pooled[name].std()}
+    of_folds = runs.groupby("fold")["f05"].mean()
+    return row | {"worst_fold_f05": of_folds.min(), "best_fold_f05": of_folds.max()}
+
+
+def leading(table: pd.DataFrame) -> str:
+    """Beginning of the columns to lead with: ``TRUTH`` where it is known, else an empty one.
+
+    Args:
+        table: of ``summarise_folds``, or of the runs.
+    """
+    return TRUTH if table[f"{TRUTH}{DECISIVE}"].notna().any() else ""
 
 
 def case_name(model: str, voxels: str) -> str:
@@ -66,9 +102,14 @@ def ranking(table: pd.DataFrame, models: Mapping[str, str]) -> str:
         table: of ``summarise_folds``.
         models: name -> architecture; not used, as the ranking treats all models alike.
     """
-    ranked = table.sort_values(DECISIVE, ascending=False)
+    start = leading(table)
+    column, against = f"{start}{DECISIVE}", " against the truth" if start else ""
+    ranked = table.sort_values(column, ascending=False)
     scores = [
-        f"{case_name(row['model'], row['voxels'])} {score_text(row[DECISIVE], 3)}"
+        f"{case_name(row['model'], row['voxels'])} {score_text(row[column], 3)}"
         for row in ranked.to_dict("records")
     ]
-    return f"{score_column(DECISIVE).label} of the tower class, best first: {', '.join(scores)}."
+    return (
+        f"{score_column(DECISIVE).label} of the tower class{against}, best first: "
+        f"{', '.join(scores)}."
+    )

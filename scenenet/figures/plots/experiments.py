@@ -10,7 +10,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from scenenet.experiments.cross_validation.summary import CASE, case_name, summarise_folds
+from scenenet.experiments.cross_validation.summary import (
+    CASE,
+    case_name,
+    leading,
+    summarise_folds,
+)
 from scenenet.experiments.label_noise.settings import LABELS
 from scenenet.figures.plots.style import COLOURS, new_figure, save
 from scenenet.metrics.score_columns import CHART_SCORES, score_text
@@ -61,36 +66,42 @@ def label_noise(summary: pd.DataFrame, out: str | Path) -> str:
 
 
 def cross_validation(runs: pd.DataFrame, out: str | Path) -> str:
-    """Precision, recall and F0.5 of each model, and F0.5 of each of its folds.
+    """Precision, recall and F0.5 of each model, and F0.5 of each of its folds, against the truth
+    where it is known.
 
     Args:
         runs: of ``scenenet.experiments.cross_validation.run``.
         out: PNG to write.
     """
     summary = summarise_folds(runs)
+    start = leading(runs)
     places = np.arange(len(summary))
     figure, axes = new_figure(1, 1, width=7.2, height=0.6 * len(summary) + 1.5)
     axis = axes[0, 0]
     for i, (name, label) in enumerate((c.name, c.label) for c in CHART_SCORES):
         at = places + 0.2 * (i - 1)
-        spread = summary[f"{name}_std"].fillna(0)
-        axis.errorbar(summary[name], at, xerr=spread, fmt="o", ms=6, capsize=3, color=COLOURS[i],
-                      label=label)  # fmt: skip
-    folds = runs.groupby([*CASE, "fold"], sort=False)["f05"].mean()
+        spread = summary[f"{start}{name}_std"].fillna(0)
+        axis.errorbar(summary[f"{start}{name}"], at, xerr=spread, fmt="o", ms=6, capsize=3,
+                      color=COLOURS[i], label=label)  # fmt: skip
+    folds = runs.groupby([*CASE, "fold"], sort=False)[f"{start}f05"].mean()
     cases = list(zip(*(summary[name] for name in CASE), strict=True))
     for place, case in zip(places, cases, strict=True):
         of_model = folds[case]
         axis.plot(of_model, np.full(len(of_model), place + 0.36), "|", ms=7, mew=1.5,
                   color=FOLD_COLOUR, label="F0.5 of a fold" if place == 0 else None)  # fmt: skip
     axis.set_yticks(places, [case_name(*case) for case in cases])
-    axis.set(xlabel="score: mean over folds, with its spread over seeds", xlim=(-0.02, 1.02))
+    against = "the truth" if start else "the labels"
+    axis.set(xlabel=f"score against {against}: mean over folds, with its spread over seeds",
+             xlim=(-0.02, 1.02))  # fmt: skip
     axis.invert_yaxis()
     figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
     save(figure, out)
     scores = "; ".join(
-        f"{case_name(row.model, row.voxels)}: precision {score_text(row.precision)}, recall "
-        f"{score_text(row.recall)}, F0.5 {score_text(row.f05)}, folds from "
-        f"{score_text(row.worst_fold_f05)} to {score_text(row.best_fold_f05)}"
-        for row in summary.itertuples()
+        f"{case_name(row['model'], row['voxels'])}: "
+        f"precision {score_text(row[f'{start}precision'])}, "
+        f"recall {score_text(row[f'{start}recall'])}, F0.5 {score_text(row[f'{start}f05'])}, "
+        f"folds from {score_text(row[f'{start}worst_fold_f05'])} to "
+        f"{score_text(row[f'{start}best_fold_f05'])}"
+        for row in summary.to_dict("records")
     )
-    return f"Cross-validated scores of each model as points. {scores}."
+    return f"Cross-validated scores of each model against {against} as points. {scores}."

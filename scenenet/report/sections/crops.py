@@ -17,7 +17,8 @@ def crops(context: ReportContext) -> Section | None:
     if not blocks:
         return None
     rule = Text(
-        "Three test crops, selected by rule: those with the highest, median and lowest F0.5."
+        "Three test crops, selected by rule: those with the highest, median and lowest F0.5 "
+        "against the labels, with which the pictures compare."
     )
     return Section("crops", "Single crops", [rule, *blocks])
 

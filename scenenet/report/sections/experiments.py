@@ -8,7 +8,7 @@ from scenenet.experiments.label_noise.summary import findings
 from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.metrics.score_columns import SCORE_COLUMNS, score_text
 from scenenet.report.blocks import Column, Facts, Notes, Section, Text, table
-from scenenet.report.context import ReportContext
+from scenenet.report.context import ReportContext, against, against_each
 
 TOWER_SCORES = [column for column in SCORE_COLUMNS if column.tower_only]
 
@@ -19,35 +19,39 @@ def cross_validation(context: ReportContext) -> Section | None:
     frame = context.table(experiment.name)
     if frame is None:
         return None
-    columns = [
-        Column("model", "model"),
-        Column("voxels", "voxels that count"),
-        Column("live_share", "share of live models", "score2"),
+    measured = against(frame, "f05")
+    scores = [
         *(Column(c.name, c.label, "score", f"{c.name}_std") for c in TOWER_SCORES),
         Column("pooled_f05", "F0.5, pooled", "score", "pooled_f05_std"),
         Column("worst_fold_f05", "F0.5, worst fold", "score"),
         Column("best_fold_f05", "F0.5, best fold", "score"),
+    ]
+    columns = [
+        Column("model", "model"),
+        Column("voxels", "voxels that count"),
+        Column("live_share", "share of live models", "score2"),
+        *against_each(scores, measured),
         Column("parameters", "parameters", "count"),
     ]
     first = frame.iloc[0]
     crops, n_folds, seeds = int(first["crops"]), int(first["n_folds"]), int(first["n_seeds"])
     caption = (
         f"Each of {crops} crops is left out once, in {n_folds} fixed folds; models are trained and "
-        f"tau is chosen on the others. Mean over the folds ± its standard deviation over {seeds} "
-        "seeds. Pooled: from the counts of all folds together. “At or above tau”: every voxel "
-        "whose probability reaches the threshold counts as detected. “Whole towers”: every voxel "
-        "of a tower that was found counts as detected, its body included, by the same rules for "
-        "every model (docs/method/detection.md)."
+        "tau is chosen on the labels of the others. Mean over the folds ± its standard deviation "
+        f"over {seeds} seeds. Pooled: from the counts of all folds together. “At or above tau”: "
+        "every voxel whose probability reaches the threshold counts as detected. “Whole towers”: "
+        "every voxel of a tower that was found counts as detected, its body included, by the same "
+        "rules for every model (docs/method/detection.md)."
     )
     text = (
         f"Main result: with only {crops} crops, each of them is a test crop once, so that no score "
         "depends on a single split. "
         f"{experiment.finding(frame, context.results.models)}"
     )
-    ranked = frame.sort_values("f05", ascending=False)
+    decisive = f"{measured[0].prefix}f05"
     facts = [
-        (f"F0.5, {case_name(row.model, row.voxels)}", score_text(row.f05, 3))
-        for row in ranked.itertuples()
+        (f"F0.5, {case_name(row['model'], row['voxels'])}", score_text(row[decisive], 3))
+        for row in frame.sort_values(decisive, ascending=False).to_dict("records")
     ]
     return Section(
         "cross-validation",

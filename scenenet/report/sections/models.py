@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import pandas as pd
 
@@ -23,6 +22,8 @@ from scenenet.report.context import (
     Against,
     ReportContext,
     against,
+    against_column,
+    against_each,
     with_published,
 )
 from scenenet.results.score_tables import TRIVIAL
@@ -61,7 +62,7 @@ def _scores(frame: pd.DataFrame, measured: Against) -> Block:
         Column("parameters", "parameters", "count"),
     ]
     if measured is AGAINST_TRUTH:
-        columns += [_against(column, measured) for column in VOXEL_SCORES]
+        columns += [against_column(column, measured) for column in VOXEL_SCORES]
         caption = (
             "Against the truth: scores of the tower class over all voxels of the test crops, at "
             "the tau chosen on the labels of the validation crops, mean ± standard deviation over "
@@ -72,11 +73,11 @@ def _scores(frame: pd.DataFrame, measured: Against) -> Block:
     caption = (
         "Against the labels: scores of the tower class over all voxels of the test crops, at the "
         "tau chosen on the validation crops, mean ± standard deviation over seeds, with the scores "
-        "of thesis Table 5.3. The mean IoU is over background and tower, as in the thesis. The thesis used other "
-        "data and reports live models only, so compare the order of the models and not the digits. "
-        "“Voxels that count” are those at or above tau, as in the thesis, or those of whole towers "
-        f"that are found with them; the next table has both for every model. “{TRIVIAL}” is a "
-        f"model that never predicts tower."
+        "of thesis Table 5.3. The mean IoU is over background and tower, as in the thesis. The "
+        "thesis used other data and reports live models only, so compare the order of the models "
+        "and not the digits. “Voxels that count” are those at or above tau, as in the thesis, or "
+        f"those of whole towers that are found with them; the next table has both for every model. "
+        f"“{TRIVIAL}” is a model that never predicts tower."
     )
     return table(frame, columns, caption, "tables/models.csv")
 
@@ -92,31 +93,13 @@ def _each_seed(seeds: pd.DataFrame, measured: Sequence[Against]) -> Block:
         Column("alive", "live", "yes"),
         Column("tau", "tau", "score"),
         Column("validation_f05", "F0.5, validation", "score"),
-        *_against_each(scores, measured),
+        *against_each(scores, measured),
     ]
     caption = (
         "Every single training: scores on the test crops at the tau chosen on the validation "
         "crops. A live model detects at least one voxel labelled tower."
     )
     return table(seeds, columns, caption, "tables/seeds.csv", folded=True)
-
-
-def _against_each(columns: Sequence[Column], measured: Sequence[Against]) -> list[Column]:
-    """Columns for each of what they are measured against, which their headings name if it is more
-    than the labels."""
-    if len(measured) == 1:
-        return list(columns)
-    return [_against(column, one, one.name) for one in measured for column in columns]
-
-
-def _against(column: Column, measured: Against, named: str = "") -> Column:
-    """The column with the same score against something, which the heading names."""
-    return replace(
-        column,
-        name=f"{measured.prefix}{column.name}",
-        label=f"{column.label} ({named})" if named else column.label,
-        spread=None if column.spread is None else f"{measured.prefix}{column.spread}",
-    )
 
 
 def _whole_towers(context: ReportContext) -> list[Block]:
@@ -133,7 +116,7 @@ def _whole_towers(context: ReportContext) -> list[Block]:
 
 
 def _both_ways(frame: pd.DataFrame, scores: Sequence[Column], measured: Against) -> Block:
-    columns = [Column("model", "model"), *(_against(column, measured) for column in scores)]
+    columns = [Column("model", "model"), *(against_column(column, measured) for column in scores)]
     caption = (
         f"Against the {measured.name}: "
         "the same predictions on the same test crops, counted in two ways: the voxels at or above "
@@ -190,7 +173,7 @@ def _of_matches(scores: Sequence[MatchColumn], measured: Against) -> list[Column
     for c in scores:
         label = c.label.replace("labelled", measured.adjective)
         spread = None if c.kind == "count" else f"{c.name}_std"
-        columns.append(_against(Column(c.name, label, c.kind, spread), measured))
+        columns.append(against_column(Column(c.name, label, c.kind, spread), measured))
     return columns
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
-from scenenet.dataset.crops import CropSettings, crop_of, cut_crops
+from scenenet.dataset.crops import CropSettings, Truth, crop_of, cut_crops
 from scenenet.dataset.folds import folds
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.voxel_cache import build, load
@@ -17,9 +19,9 @@ from scenenet.experiments.cross_validation.run import (
     cross_validate,
     run_folds,
 )
-from scenenet.experiments.cross_validation.summary import summarise_folds
+from scenenet.experiments.cross_validation.summary import ranking, summarise_folds
 from scenenet.experiments.train_and_tune import train_and_tune
-from scenenet.metrics.score_columns import AT_TAU, WHOLE_TOWERS
+from scenenet.metrics.score_columns import AT_TAU, SCORES, WHOLE_TOWERS
 from scenenet.synthetic import SyntheticSettings, make_survey
 
 DETECTION = DetectionSettings()
@@ -31,12 +33,12 @@ def manifest(tmp_path_factory):
     """Voxels of a synthetic line, from the stages of the workflow."""
     folder = tmp_path_factory.mktemp("crossed")
     line = SyntheticSettings(towers=6, seed=4, density=12, tower_density=24)
-    make_survey(line, folder / "line.laz")
-    towers = survey_towers(folder / "line.laz", "edp", TowerSettings()).towers
+    survey, truth = folder / "line.laz", folder / "line.truth.laz"
+    make_survey(line, survey, truth=truth)
+    towers, true = (survey_towers(path, "edp", TowerSettings()).towers for path in (survey, truth))
     crops = folder / "crops.json"
-    cut_crops(
-        "line", folder / "line.laz", "edp", towers, CropSettings(), folder / "crops.zarr.zip", crops
-    )
+    cut_crops("line", survey, "edp", towers, CropSettings(), folder / "crops.zarr.zip", crops,
+              Truth(truth, true))  # fmt: skip
     build(crops, GRID, folder / "voxels.zarr.zip", folder / "voxels.json")
     return folder / "voxels.json"
 
@@ -68,6 +70,26 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     row = whole[(whole["seed"] == 1) & (whole["fold"] == 2)].iloc[0]
     counts = tuned.score_towers(out, DETECTION)
     assert (row["tau"], row["f05"], row["tp"]) == (tuned.tau, counts.f05, counts.tp)
+    against_truth = [replace(sample, tower=sample.true) for sample in out]
+    counts = tuned.score_towers(against_truth, DETECTION)
+    assert (row["truth_f05"], row["truth_tp"]) == (counts.f05, counts.tp)
+    row = table[(table["seed"] == 1) & (table["fold"] == 2)].iloc[0]
+    counts = tuned.score(against_truth)
+    assert (row["truth_f05"], row["truth_tp"]) == (counts.f05, counts.tp)
+    assert row["truth_tp"] + row["truth_fn"] == sum(int(sample.true.sum()) for sample in out)
+    assert row["truth_tp"] + row["truth_fn"] < row["tp"] + row["fn"]
+
+
+def test_only_crops_with_a_known_truth_are_scored_against_it(manifest, models):
+    dataset = load([manifest])
+    some = [replace(s, true=s.true if n else None) for n, s in enumerate(dataset.samples)]
+    rows = run_folds(replace(dataset, samples=some), models[1], (0,), 2, 0.0, DETECTION)
+    first = next(row for row in rows if row["voxels"] == AT_TAU and row["fold"] == 1)
+    assert first["truth_tp"] + first["truth_fn"] == some[1].true.sum()
+    none = [replace(sample, true=None) for sample in some]
+    for row in run_folds(replace(dataset, samples=none), models[1], (0,), 2, 0.0, DETECTION):
+        assert row["truth_f05"] is None and row["truth_tp"] is None
+        assert row["f05"] is not None
 
 
 def test_the_boosted_trees_take_part(manifest):
@@ -84,7 +106,13 @@ def runs() -> pd.DataFrame:
                                         (1, 1, 6, 4, 12, 0.4), (1, 2, 0, 0, 4, 0.0)]:  # fmt: skip
         row = dict.fromkeys(COLUMNS, 1.0) | {"model": "m", "seed": seed, "fold": fold, "f05": f05}
         row |= {"crops": "a b" if fold == 1 else "c", "alive": tp > 0}
-        rows.append(row | {"tp": tp, "fp": fp, "fn": fn, "tn": 1000})
+        row |= {"tp": tp, "fp": fp, "fn": fn, "tn": 1000}
+        # Against the truth, the second fold is not known.
+        row |= {f"truth_{name}": None for name in (*SCORES, "tp", "fp", "fn", "tn")}
+        if fold == 1:
+            row |= {"truth_f05": f05 / 2, "truth_tp": tp / 2, "truth_fp": fp + tp / 2,
+                    "truth_fn": 0, "truth_tn": 1000}  # fmt: skip
+        rows.append(row)
     return pd.DataFrame(rows)
 
 
@@ -98,6 +126,22 @@ def test_means_over_folds_their_spread_over_seeds_and_pooled_counts():
     assert row["pooled_f05"] == pytest.approx(np.mean(f05))
     assert row["pooled_precision"] == pytest.approx((10 / 12 + 0.6) / 2)
     assert (row["worst_fold_f05"], row["best_fold_f05"]) == (0.4, 0.5)
+
+
+def test_scores_against_the_truth_are_those_of_the_folds_whose_truth_is_known():
+    table = summarise_folds(runs())
+    (row,) = table.to_dict("records")
+    assert row["truth_f05"] == pytest.approx(0.25)  # 0.3 and 0.2
+    # Seed 0: 4 of 10 detected are true; seed 1: 3 of 10.
+    assert row["truth_pooled_precision"] == pytest.approx((0.4 + 0.3) / 2)
+    assert row["truth_pooled_recall"] == 1.0
+    assert ranking(table, {}) == (
+        "F0.5 of the tower class against the truth, best first: m, 1.0 0.250."
+    )
+    labels = runs().assign(**{f"truth_{name}": None for name in (*SCORES, "tp", "fp", "fn", "tn")})
+    without = summarise_folds(labels)
+    assert without.filter(like="truth_").isna().all(axis=None)
+    assert ranking(without, {}) == "F0.5 of the tower class, best first: m, 1.0 0.450."
 
 
 def test_one_seed_has_no_spread():

@@ -101,7 +101,9 @@ def fold_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
         description = (
             f"Cross-validation over {row['crops']} crops in {row['n_folds']} folds. Metrics are "
             "means over folds and seeds; `spread_` is the standard deviation over seeds of the "
-            "mean over folds; `pooled_` is computed from the counts of all folds together."
+            "mean over folds; `pooled_` is computed from the counts of all folds together. "
+            "`truth_` is measured against the truth, where it is known, the others against the "
+            "labels."
         )
         group = group_of(
             "cross_validation",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import laspy
-import numpy as np
 import pytest
 
 from scenenet.dataset.crops import CropSettings, Truth, cut_crops, read_crops
@@ -17,8 +15,8 @@ from scenenet.evaluation.scoring import evaluate
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.model_file import write_model
 from scenenet.pointcloud import write_las
+from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.writers import PredictionFiles, write_prediction
 from scenenet.synthetic import SyntheticSettings, make_survey
 
 LONE_POLES = DetectionSettings(min_conductor=0)
@@ -48,9 +46,8 @@ def test_points_of_a_crop_are_those_of_its_classified_survey(folder, tmp_path, c
     crop, cloud = next(read_crops(folder / "crops.json"))
     assert set(found) == {crop.id}
     write_las(tmp_path / "crop.laz", cloud)
-    files = PredictionFiles.of(tmp_path / "crop.laz", tmp_path / "out")
-    write_prediction(tmp_path / "crop.laz", model, files, PredictSettings(), LONE_POLES)
-    in_tower = np.asarray(laspy.read(files.points).tower_id) > 0
+    with predict_survey(tmp_path / "crop.laz", model, PredictSettings(), LONE_POLES) as prediction:
+        in_tower = prediction.look_up(cloud.xyz).tower_id > 0
     assert in_tower.sum() > 100
     counts = found[crop.id]
     # The survey has coordinates in steps of a millimetre, which moves few points to other voxels.

@@ -91,14 +91,17 @@ def test_a_parent_for_each_model_and_level_and_a_run_for_each_seed():
     assert len(set(keys)) == len(keys)
 
 
-def crossed_runs() -> pd.DataFrame:
+def crossed_runs(truth: bool = False) -> pd.DataFrame:
+    """Against the truth, if it is known, the order of the models is the opposite."""
     rows = []
+    of_truth = [name for name in cross_validation.COLUMNS if name.startswith("truth_")]
     for model, base in (("scenenet", 0.7), ("cnn", 0.3), ("boosted trees", 0.8)):
         for seed in (0, 1):
             for fold, crops in ((1, "a b"), (2, "c d")):
                 row = dict.fromkeys(cross_validation.COLUMNS, 0.5) | {"voxels": AT_TAU}
                 row |= {"model": model, "seed": seed, "fold": fold, "crops": crops, "alive": True}
                 row |= {"f05": base + seed / 50 + fold / 10, "tp": 5, "fp": 1, "fn": 4, "tn": 90}
+                row |= {"truth_f05": 1 - row["f05"]} if truth else dict.fromkeys(of_truth)
                 rows.append(row)
     return pd.DataFrame(rows)
 
@@ -138,6 +141,28 @@ def test_cross_validation_is_the_main_result_if_it_was_run(results, thesis):
     assert experiment_sections.cross_validation(ReportContext(results, thesis)) is not None
     (results.folder / "tables" / "cross_validation.csv").unlink()
     assert experiment_sections.cross_validation(ReportContext(results, thesis)) is None
+
+
+def test_the_cross_validation_leads_with_the_truth_where_it_is_known(results, thesis):
+    (results.folder / "cross_validation").mkdir()
+    runs = crossed_runs(truth=True)
+    runs.to_csv(results.folder / "cross_validation" / "runs.csv", index=False)
+    crossed = replace(results, experiments=("cross_validation",))
+    write_tables(crossed, thesis, crossed.folder / "tables", names=())
+    (drawing,) = [d for d in plan(crossed) if d.section == "cross_validation"]
+    (picture,) = draw_all([drawing], crossed.folder / "figures")
+    assert (
+        "scenenet: precision 0.50, recall 0.50, F0.5 0.14, folds from 0.09 to 0.19" in picture.alt
+    )
+    assert "against the truth" in picture.alt and "scores are against the truth" in picture.caption
+    section = experiment_sections.cross_validation(ReportContext(crossed, thesis))
+    best_first = "against the truth, best first: cnn 0.540, scenenet 0.140, boosted trees 0.040"
+    assert best_first in section.blocks[0].text
+    assert section.blocks[1].items[0] == ("F0.5, cnn", "0.540")
+    labels = [column.label for column in section.blocks[-1].columns]
+    assert labels.index("F0.5 (truth)") < labels.index("F0.5 (labels)")
+    (group, *_) = fold_groups(runs, Origin("tiny"))
+    assert group.parent.metrics["truth_f05"] == pytest.approx(0.14)
 
 
 def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():

@@ -12,10 +12,12 @@ import pytest
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json, write_json
+from scenenet.evaluation.result import Scores
 from scenenet.experiments.published import Thesis
 from scenenet.experiments.studies.run import COLUMNS
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
+from scenenet.metrics.score_columns import SCORES
 from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
 from scenenet.results.folder import Results
@@ -230,6 +232,59 @@ def test_a_broken_picture_is_named(page: Path, results: Results, thesis: Thesis)
 )
 def test_values_are_formatted_for_readers(value, how, text):
     assert write(value, how) == text
+
+
+def with_truth(results: Results) -> Results:
+    """The results with a truth against which every score is a quarter of that against labels."""
+    for path in results.folder.glob("evaluate/*/*.json"):
+        told = read_json(path)
+        points = {"precision": 0.5, "recall": 0.6, "iou": 0.4, "n_true": 70, "n_predicted": 90}
+        truth = {name: told[name] for name in Scores.__dataclass_fields__}
+        for part in [name for name in truth if name.startswith("voxel")]:
+            truth[part] = told[part] | {
+                score: value / 4 for score, value in told[part].items() if score in SCORES
+            }
+        truth["towers"] = told["towers"] | {"median_height_error_m": 2.25, "n_true": 7}
+        truth["points"] = points | {"precision": 0.125}
+        told |= {"points": points, "truth": truth}
+        told["labels_against_truth"] = points | {"precision": 0.375, "recall": 1.0}
+        write_json(path, told)
+    return replace(results)
+
+
+def test_the_page_leads_with_the_truth_where_it_is_known(
+    results: Results, thesis: Thesis, tmp_path: Path
+):
+    known = with_truth(results)
+    write_tables(known, thesis, known.folder / "tables")
+    out = tmp_path / "index.html"
+    sections = {section.id: section for section in write_report(known, thesis, out)}
+    opening = " ".join(block.text for block in sections["overview"].blocks if block.kind == "text")
+    assert "20% are tower in truth (precision); it finds 5% of the true tower voxels" in opening
+    assert "they are 80% and 20%." in opening  # against the labels
+    assert "F0.5 0.05, 0.05 below scenenet." in opening
+    facts = next(block for block in sections["overview"].blocks if block.kind == "facts")
+    assert ("precision of scenenet, against the truth", "0.200") in facts.items
+    tables = [block for block in sections["models"].blocks if block.kind == "table"]
+    assert [t.caption.split(":")[0] for t in tables[:4]] == [
+        "Against the truth", "Against the labels", "Against the truth", "Against the labels",
+    ]  # fmt: skip
+    assert "0.17 ± 0.04" in tables[0].rows[0]  # precision: 0.2 and 0.15
+    assert not any(column.published for column in tables[0].columns)
+    assert "0.70 ± 0.14" in tables[1].rows[0]
+    towers, of_labels, points, labelled = sections["positions"].blocks
+    assert tuple(
+        next(c.label for c in t.columns if c.label.endswith("towers")) for t in (towers, of_labels)
+    ) == ("true towers", "labelled towers")
+    assert "2.25 ± 0.00" in towers.rows[0] and "0.70 ± 0.00" in of_labels.rows[0]
+    assert points.rows[-1][:2] == ["the labels", "-"]
+    assert "0.38" in points.rows[-1] and "0.12 ± 0.00" in points.rows[0]
+    assert len(labelled.rows) == len(points.rows) - 1
+
+
+def test_without_a_truth_the_page_does_not_speak_of_it(page: Path):
+    text = read(page).text
+    assert "Against the labels" in text and "against the truth" not in text.lower()
 
 
 def test_models_with_different_protocols_are_also_compared_alike(

@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from scenenet.core.errors import InputError
+from scenenet.evaluation.result import Scores
 from scenenet.experiments.published import Thesis, read_thesis
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.metrics.score_columns import AT_TAU, SCORES, WHOLE_TOWERS
@@ -114,6 +115,41 @@ def test_each_seed_has_a_row(results: Results, thesis: Thesis):
 def test_position_errors_are_those_of_seeds_that_hit_something(results: Results, thesis: Thesis):
     found = row(tables.tower_scores(results, thesis), model="cnn", counted="all seeds")
     assert found["median_error_m"] == 1.5
+
+
+def test_scores_against_the_truth_have_columns_of_their_own(results: Results, thesis: Thesis):
+    """The truth is known for one of two seeds of one model, and nothing is tower in it twice."""
+    path = results.folder / "evaluate" / "scenenet" / "seed-1.json"
+    told = json.loads(path.read_text())
+    points = {"precision": 0.5, "recall": None, "iou": 0.25, "n_true": 0, "n_predicted": 9}
+    truth = {name: told[name] for name in Scores.__dataclass_fields__}
+    truth |= {
+        "voxel": told["voxel"] | {"f05": 0.125},
+        "towers": told["towers"] | {"median_base_error_m": 2.5},
+        "points": points,
+    }
+    told |= {"truth": truth, "labels_against_truth": points | {"precision": 0.75}}
+    path.write_text(json.dumps(told))
+    fresh = replace(results)
+    found = tables.models(fresh, thesis)
+    assert row(found, model="scenenet", counted="all seeds")["truth_f05"] == 0.125
+    assert row(found, model="scenenet", counted="all seeds")["f05"] == pytest.approx(0.35)
+    assert found.loc[found["model"] == "cnn", "truth_f05"].isna().all()
+    columns = list(found.columns)
+    assert columns.index("truth_precision") < columns.index("precision")
+    towers = row(tables.tower_scores(fresh, thesis), model="scenenet", counted="all seeds")
+    assert (towers["truth_median_base_error_m"], towers["median_height_error_m"]) == (2.5, 0.7)
+    of_points = tables.point_scores(fresh, thesis)
+    model = row(of_points, model="scenenet", counted="all seeds")
+    assert (model["truth_precision"], model["truth_n_predicted"]) == (0.5, 9)
+    assert math.isnan(model["truth_recall"]) and math.isnan(model["precision"])
+    labels = of_points.iloc[-1]
+    assert (labels["model"], labels["truth_precision"]) == ("the labels", 0.75)
+    seeds = tables.seeds(fresh)
+    known = row(seeds, model="scenenet", seed=1)
+    assert (known["truth_f05"], known["truth_point_iou"]) == (0.125, 0.25)
+    assert known["truth_average_precision"] == known["average_precision"]
+    assert seeds["truth_f05"].notna().sum() == 1
 
 
 def test_training_time_is_the_sum_of_the_epochs(results: Results, thesis: Thesis):

@@ -18,6 +18,7 @@ import numba
 import numpy as np
 from pydantic import Field
 
+from scenenet.baselines.quantile_bins import QuantileBins
 from scenenet.baselines.voxel_features import voxel_features
 from scenenet.core.errors import InputError
 from scenenet.core.settings import Settings
@@ -210,13 +211,16 @@ def _fit(
         random_state=seed,
     )
     each = settings.tower_weight * (len(tower) - n_tower) / n_tower
-    grown.fit(np.concatenate(features), tower, sample_weight=np.where(tower, each, 1.0))
+    weights = np.where(tower, each, 1.0)
+    known = np.concatenate(features)
+    bins = QuantileBins(known, weights)
+    grown.fit(bins.numbers(known), tower, sample_weight=weights)
     odds = float(grown._baseline_prediction.item())
-    return BoostedTrees(settings, seed, odds, _trees_of(grown), None, dict(provenance or {}))
+    return BoostedTrees(settings, seed, odds, _trees_of(grown, bins), None, dict(provenance or {}))
 
 
-def _trees_of(grown: Any) -> Trees:
-    """The trees of a fitted classifier.
+def _trees_of(grown: Any, bins: QuantileBins | None = None) -> Trees:
+    """The trees of a classifier that was fitted to features, or to their ``bins``.
 
     scikit-learn has no public access to them; a test compares the probabilities with its own.
     """
@@ -225,10 +229,14 @@ def _trees_of(grown: Any) -> Trees:
     every = np.concatenate(nodes)
     shift = np.repeat(root, [len(tree) for tree in nodes])
     leaf = every["is_leaf"].astype(bool)
+    feature, threshold = every["feature_idx"], every["num_threshold"].astype(np.float64)
+    if bins is not None:
+        for split in np.flatnonzero(~leaf):
+            threshold[split] = bins.threshold(feature[split], threshold[split])
     return Trees(
         root,
-        np.where(leaf, -1, every["feature_idx"]).astype(np.int32),
-        np.where(leaf, 0.0, every["num_threshold"]),
+        np.where(leaf, -1, feature).astype(np.int32),
+        np.where(leaf, 0.0, threshold),
         np.where(leaf, 0, every["left"] + shift).astype(np.int32),
         np.where(leaf, 0, every["right"] + shift).astype(np.int32),
         np.where(leaf, every["value"], 0.0),

@@ -8,8 +8,11 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.utils import compute_sample_weight
 
+from scenenet.baselines.quantile_bins import QuantileBins
 from scenenet.core.errors import InputError
+from scenenet.experiments.domain_gap import compare_crops
 from scenenet.experiments.domain_gap.compare_crops import (
     compare_properties,
     crop_separability,
@@ -93,3 +96,18 @@ def test_one_differing_property_is_enough_to_separate():
     assert test.auc > 0.99
     assert test.features["a"] == 1.0
     assert test.features["b"] == 0.5
+
+
+@pytest.mark.parametrize("rows", [3000, 12_000])
+def test_the_bins_of_the_voxels_give_the_classifier_of_scikit_learn(rows):
+    rng = np.random.default_rng(rows)
+    features = np.round(rng.normal(size=(rows, 4)), 3)
+    real = (features[:, 0] * features[:, 1] + rng.normal(size=rows) > 1).astype(int)
+    kept = compare_crops._not_held_out(real)
+    bins = QuantileBins(features[kept], compute_sample_weight("balanced", real)[kept])
+    theirs = compare_crops._classifier(200).fit(features, real)
+    ours = compare_crops._classifier(200).fit(bins.numbers(features), real)
+    assert (len(kept) < rows) == theirs.do_early_stopping_
+    np.testing.assert_array_equal(
+        ours.decision_function(bins.numbers(features)), theirs.decision_function(features)
+    )

@@ -18,6 +18,11 @@ MAX_VOXELS = 2**28
 """Voxels of the largest grid allowed, 16 times as many as 256^3: its probabilities take 1 GiB."""
 
 
+BORDER_M = 2.0**-21
+"""A point this close below the border of a voxel, 0.5 micrometre, belongs to the voxel above. A
+border is often a multiple of the steps of a file, and the sum of offset and steps then lands on
+either side of it by rounding, so that another offset of the same survey would move the point."""
+
 SMALLEST_VOXEL, LARGEST_VOXEL = 0.01, 1000.0
 """Edges that voxels can have, m."""
 
@@ -69,6 +74,8 @@ class VoxelGrid:
         """resolution^3 voxels over the bounding cube of points (N, 3): each side of the bounding
         box is widened about its middle to the longest side, as in the published code.
 
+        Points on a border are placed as that code places them, by rounding, without ``BORDER_M``.
+
         Raises:
             InputError: there are no points, all have the same coordinates, or the voxels would be
                 smaller than ``SMALLEST_VOXEL`` or larger than ``LARGEST_VOXEL``.
@@ -90,20 +97,21 @@ class VoxelGrid:
     @classmethod
     def metric(cls, xyz: np.ndarray, voxel_size: float) -> VoxelGrid:
         """As many voxels of ``voxel_size`` (m) as points (N, 3) need, centred on their bounding
-        box.
+        box, and ``BORDER_M`` below it.
 
         Raises:
             InputError: there are no points, or they are too far apart.
         """
         low, high = _bounds(xyz)
-        counts = np.maximum(1, np.ceil((high - low) / voxel_size)).astype(int)
+        # Rounding must add no voxel to an extent of whole voxels: all borders would move.
+        counts = np.maximum(1, np.ceil((high - low - BORDER_M) / voxel_size)).astype(int)
         if np.prod(counts.astype(float)) > MAX_VOXELS:
             extent = " x ".join(f"{side:.0f}" for side in high - low)
             raise InputError(
                 f"a grid over {extent} m needs more than {MAX_VOXELS} voxels of {voxel_size:g} m",
                 remedy="Remove stray points, or use larger voxels",
             )
-        origin = (low + high - counts * voxel_size) / 2
+        origin = (low + high - counts * voxel_size) / 2 - BORDER_M
         return cls(tuple(origin.tolist()), float(voxel_size), tuple(counts[::-1].tolist()))
 
     @property

@@ -14,14 +14,10 @@ from pathlib import Path
 import numpy as np
 
 from scenenet.core.errors import InputError
+from scenenet.dataset.voxels import BORDER_M
 
 EDGE = 64
 """Voxels along the edge of a tile; a tile and its halo fit into a processor's cache."""
-
-BORDER_M = 2.0**-21
-"""A point this close below the border of a voxel, 0.5 micrometre, belongs to the voxel above. A
-border is often a multiple of the steps of a file, and the sum of offset and steps then lands on
-either side of it by rounding, so that another offset of the same survey would move the point."""
 
 NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)))
 """(27, 3) steps (z, y, x) from a tile to itself and to the tiles around it."""

@@ -14,7 +14,7 @@ from scenenet.core.errors import InputError, OutputError
 from scenenet.dataset.crops import CropSettings, Truth, cut_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.voxel_cache import build, load
-from scenenet.dataset.voxels import VoxelGrid, VoxelSettings, voxelise
+from scenenet.dataset.voxels import BORDER_M, VoxelGrid, VoxelSettings, voxelise
 from scenenet.dataset.zarr_store import StoreReader
 from scenenet.pointcloud import PointCloud, class_scheme
 
@@ -61,7 +61,28 @@ def test_the_cube_is_centred_on_the_bounding_box_and_its_longest_side_sets_the_v
 def test_the_metric_grid_has_as_many_voxels_as_the_points_need():
     grid = VoxelGrid.metric(np.array([[0, 0, 0], [8, 3, 0.5]]), 2.0)
     assert grid.shape == (1, 2, 4)
-    assert grid.origin == (0.0, -0.5, -0.75)
+    assert grid.origin == pytest.approx((0.0, -0.5, -0.75), abs=2 * BORDER_M)
+
+
+@given(
+    st.sampled_from([0.001, 0.01]),
+    st.sampled_from([0.5, 1.0, 2.0]),
+    st.integers(-2_000_000_000, 2_000_000_000),
+    st.integers(4, 40),
+)
+def test_the_offset_of_a_file_moves_no_point_of_a_metric_grid(scale, size, offset, extent):
+    """Points every half voxel, stored as LAS does: integer times scale plus offset."""
+    steps = np.arange(0, 2 * extent + 1) * round(size / scale / 2) + round(4_630_000 / scale)
+    voxels = []
+    for shift in (0, offset):
+        x = (steps - shift) * scale + shift * scale
+        xyz = np.column_stack([x, x, np.zeros(len(x))])
+        grid = VoxelGrid.metric(xyz, size)
+        assert grid.shape == (1, extent, extent)
+        voxels.append(grid.voxel_of(xyz) % extent)
+    expected = np.minimum(np.arange(2 * extent + 1) // 2, extent - 1)
+    np.testing.assert_array_equal(voxels[0], expected)
+    np.testing.assert_array_equal(voxels[1], expected)
 
 
 @pytest.mark.parametrize(("side", "edge"), [(0.5, "0.0078"), (1e6, "1.6e+04")])

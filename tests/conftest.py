@@ -40,9 +40,15 @@ pytest_plugins = ["fixtures.noisy_lines", "fixtures.result_folder"]
 ROOT = Path(__file__).resolve().parent.parent
 
 
-LONGEST = ("tests/workflow/test_captions.py", "tests/tracking/", "tests/workflow/", "tests/cli/")
+LONGEST = (
+    "tests/workflow/test_captions.py",
+    *("tests/tracking/", "tests/cli/", "tests/trust/", "tests/experiments/"),
+    "tests/workflow/",
+    "tests/baselines/",
+)
 """Tests to begin with, so that no worker is left with a long file at the end. The first one makes
-the finished run of the workflow; the second keeps the other worker busy meanwhile."""
+the finished run of the workflow; the next ones keep the other worker busy meanwhile, because the
+rest of the workflow's tests wait for it."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

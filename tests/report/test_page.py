@@ -9,15 +9,14 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
+from fixtures.result_folder import with_truth
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json, write_json
-from scenenet.evaluation.result import Scores
 from scenenet.experiments.published import Thesis
 from scenenet.experiments.studies.run import COLUMNS
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
-from scenenet.metrics.score_columns import SCORES
 from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
 from scenenet.results.folder import Results
@@ -232,24 +231,6 @@ def test_a_broken_picture_is_named(page: Path, results: Results, thesis: Thesis)
 )
 def test_values_are_formatted_for_readers(value, how, text):
     assert write(value, how) == text
-
-
-def with_truth(results: Results) -> Results:
-    """The results with a truth against which every score is a quarter of that against labels."""
-    for path in results.folder.glob("evaluate/*/*.json"):
-        told = read_json(path)
-        points = {"precision": 0.5, "recall": 0.6, "iou": 0.4, "n_true": 70, "n_predicted": 90}
-        truth = {name: told[name] for name in Scores.__dataclass_fields__}
-        for part in [name for name in truth if name.startswith("voxel")]:
-            truth[part] = told[part] | {
-                score: value / 4 for score, value in told[part].items() if score in SCORES
-            }
-        truth["towers"] = told["towers"] | {"median_height_error_m": 2.25, "n_true": 7}
-        truth["points"] = points | {"precision": 0.125}
-        told |= {"points": points, "truth": truth}
-        told["labels_against_truth"] = points | {"precision": 0.375, "recall": 1.0}
-        write_json(path, told)
-    return replace(results)
 
 
 def test_the_page_leads_with_the_truth_where_it_is_known(

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from fixtures.result_folder import with_truth
 from mlflow import MlflowClient
 from mlflow.entities import ViewType
 
@@ -104,6 +105,18 @@ def test_a_training_is_a_run_with_all_its_facts(settings, client, results, tmp_p
     assert tags["protocol"] == "20/10/70 by stretch"
     assert (tags["scenenet.config"], tags["scenenet.code"]) == ("c0f19", "c0de")
     assert tags["scenenet.data"]
+
+
+def test_scores_against_the_truth_and_of_points_are_metrics(results):
+    (before, *_) = model_groups(results, "corridors")
+    names = before.children[0].metrics.keys() | before.parent.metrics.keys()
+    assert not [name for name in names if "truth" in name or "points" in name]
+    (group, *_) = model_groups(with_truth(results), "corridors")
+    seed = group.children[0].metrics
+    assert (seed["test_precision"], seed["truth_precision"]) == pytest.approx((0.8, 0.2))
+    assert (seed["points_precision"], seed["truth_points_precision"]) == (0.5, 0.125)
+    assert seed["truth_towers_median_height_error_m"] == 2.25
+    assert group.parent.metrics["truth_precision_mean"] == pytest.approx(0.175)
 
 
 def test_the_data_of_a_training_are_data_sets_with_their_fingerprint(

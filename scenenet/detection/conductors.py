@@ -156,7 +156,8 @@ def _thin(places: np.ndarray, candidate: np.ndarray) -> tuple[np.ndarray, np.nda
     from scipy.spatial import cKDTree
 
     n = len(places)
-    one, other = cKDTree(places).query_pairs(max(SCALES), output_type="ndarray").T
+    pairs = cKDTree(places).query_pairs(max(SCALES), output_type="ndarray")
+    one, other = pairs[candidate[pairs].any(axis=1)].T  # the others are in no sum of a candidate
     offset = places[other] - places[one]
     square = np.einsum("ni,ni->n", offset, offset)
     thinnest = np.full(n, np.inf)

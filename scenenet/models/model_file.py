@@ -130,7 +130,7 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
             file=path,
             remedy="Correct the value, or train the model again",
         ) from None
-    except (AttributeError, KeyError, TypeError, ValueError, RuntimeError) as error:
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError, RuntimeError) as error:
         raise InputError(
             f"not a readable model file ({type(error).__name__}: {error})",
             file=path,

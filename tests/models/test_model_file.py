@@ -121,6 +121,14 @@ def _put(value, *keys):
         (_put(-1.0, "voxel_size"), "not a readable model file"),
         (_put(1.5, "tau"), "not a readable model file"),
         (
+            _put(10**39, "geneos", 0, "parameters", "r", "value"),
+            "not a readable model file|not a finite number",
+        ),
+        (
+            _put(10**400, "geneos", 0, "parameters", "r", "value"),
+            "not a readable model file .OverflowError",
+        ),
+        (
             _put([9, 9], "kernel_size"),
             "not a readable model file .kernel_size is .9, 9., not three",
         ),

@@ -14,6 +14,7 @@ import numpy as np
 
 from scenenet.pointcloud.class_schemes import ClassScheme, class_scheme
 from scenenet.pointcloud.quality.codes import CODE_KINDS, code_findings
+from scenenet.pointcloud.quality.density import Density
 from scenenet.pointcloud.quality.map_scale import map_findings
 from scenenet.pointcloud.quality.relief import Relief
 from scenenet.pointcloud.quality.steps import CoordinateSteps
@@ -58,7 +59,7 @@ class Screening:
         self.counts = np.zeros(256, np.int64)
         self.mins, self.maxs = np.full(3, np.inf), np.full(3, -np.inf)
         self._steps = CoordinateSteps(info.scales)
-        self._relief = Relief()
+        self._relief, self._density = Relief(), Density()
         self._samples: list[np.ndarray] = []
 
     def add(self, xyz: np.ndarray, codes: np.ndarray) -> None:
@@ -74,6 +75,7 @@ class Screening:
         sample = xyz[:: max(1, len(xyz) // SAMPLE_POINTS)]
         self._steps.add(sample)
         self._relief.add(sample)
+        self._density.add(sample)
         self._samples.append(sample[:: max(1, len(sample) // 1000)])
 
     @property
@@ -108,7 +110,9 @@ class Screening:
             middle = np.median(np.concatenate(self._samples), axis=0)  # stray points do not count
             found += [Finding(*each) for each in map_findings(self.info.crs, middle[:2])]
         found += [Finding(*each) for each in self._steps.findings()]
-        found += [Finding(*each) for each in self._relief.findings(self.n_points)]
+        relief = [Finding(*each) for each in self._relief.findings(self.n_points)]
+        # Coordinates that are no metres have no density.
+        found += relief or [Finding(*each) for each in self._density.findings(self.n_points)]
         if self.scheme is not None:
             form = self.info.format
             found += [Finding(*each) for each in code_findings(self.counts, self.scheme, form)]

@@ -12,6 +12,7 @@ from scenenet.pointcloud.quality.check import check_survey
 from scenenet.pointcloud.quality.screening import survey_warnings
 
 UTM = pyproj.CRS.from_epsg(32629)
+GAPS = "the bodies and conductors of towers have gaps"
 N = 4000
 PLACE = np.array([545_000.0, 4_633_800.0, 250.0])
 
@@ -42,8 +43,11 @@ def survey(tmp_path):
 
 
 def said(path, codes=None) -> list[str]:
-    """The warnings, which ``check`` must have as well."""
-    found = survey_warnings(path, codes)
+    """The warnings, which ``check`` must have as well.
+
+    The surveys here are small and thin; that this is said is tested in test_density.py.
+    """
+    found = [text for text in survey_warnings(path, codes) if GAPS not in text]
     checked = check_survey(path, codes).warnings
     assert {text for text in found if "stray" not in text} <= set(checked)
     return list(found)
@@ -128,7 +132,7 @@ def test_coordinates_outside_the_area_of_their_system_are_said(survey, wrong):
 def test_stray_points_are_said_with_their_range(survey):
     xyz = corridor()
     xyz[7] = [945_000, 4_633_800, 250]
-    (text,) = survey_warnings(survey(xyz))
+    (text,) = [text for text in survey_warnings(survey(xyz)) if GAPS not in text]
     assert text.startswith("stray coordinates") and "x 545000 to 945000" in text
     assert "y 4" not in text
 

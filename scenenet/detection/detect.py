@@ -7,13 +7,20 @@ depends on how many of its voxels the model detects.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scenenet.detection.body import centre_body, measure_body
-from scenenet.detection.conductors import FAR, SCALES, Span, leaving_spans
+from scenenet.detection.candidates import (
+    MEAN_SHIFTS,
+    SURROUNDINGS_M,
+    DetectedVoxels,
+    axes,
+    neighbours_adjacent,
+)
+from scenenet.detection.conductors import Span, leaving_spans
 from scenenet.detection.settings import DetectionSettings
 
 
@@ -49,13 +56,6 @@ Surroundings = Callable[[np.ndarray, float], np.ndarray]
 """A function of a position (2,) m and a radius in m, which returns the centres (M, 3) m of the
 occupied voxels within this radius in plan."""
 
-SURROUNDINGS_M = FAR + max(SCALES)
-"""m, radius around an axis in which the occupied voxels are measured."""
-
-MEAN_SHIFTS = 5
-"""Number of times that an axis moves to the mean of the voxels around it; the last moves are
-small."""
-
 MIN_DISTANCE = 0.5
 """Smallest distance between two towers, as a share of the height of the first."""
 
@@ -80,19 +80,43 @@ def detect_towers(
     if len(centres) == 0:
         return []
     offset = centres.min(axis=0)
-    detected = _Detected(centres - offset, probability, voxel_size)
-    found = []
-    for axis in _neighbours_adjacent(_axes(detected, settings)):
-        around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
-        tower = _measure(detected, axis, around, tau, settings)
-        if tower is not None:
-            found.append(tower)
+    detected = DetectedVoxels(centres - offset, probability, voxel_size)
+    found = measured_axes(detected, offset, surroundings, tau, settings, settings.eps, settings)
     x, y, z = (float(metres) for metres in offset)
     towers = [
         replace(tower, x=tower.x + x, y=tower.y + y, base=tower.base + z)
         for tower in _without_duplicates(found, detected, settings)
     ]
-    return sorted(towers, key=lambda t: (-t.probability, t.x, t.y))
+    return sorted(towers, key=highest_probability)
+
+
+def highest_probability(tower: DetectedTower) -> tuple[float, float, float]:
+    """Sorting key of tower lists."""
+    return -tower.probability, tower.x, tower.y
+
+
+def measured_axes(
+    detected: DetectedVoxels,
+    offset: np.ndarray,
+    surroundings: Surroundings,
+    tau: float,
+    settings: DetectionSettings,
+    apart: float,
+    tests: DetectionSettings,
+) -> list[DetectedTower]:
+    """The towers at the axes of the detected voxels, relative to ``offset`` (3,) m.
+
+    Args:
+        apart: m, between the starts of two axes.
+        tests: settings whose thresholds a tower has to reach.
+    """
+    found = []
+    for axis in neighbours_adjacent(axes(detected, settings, apart)):
+        around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
+        tower = _measure(detected, axis, around, tau, tests, moves=apart >= settings.eps)
+        if tower is not None:
+            found.append(tower)
+    return found
 
 
 def body_voxels(
@@ -117,81 +141,21 @@ def surroundings_in(places: np.ndarray) -> Surroundings:
     return near
 
 
-class _Detected:
-    """Detected voxels (V, 3) m, with search by position in plan."""
-
-    def __init__(self, centres: np.ndarray, probability: np.ndarray, voxel_size: float) -> None:
-        from scipy.spatial import cKDTree
-
-        self.centres, self.probability, self.voxel_size = centres, probability, voxel_size
-        self.columns, column_of = np.unique(centres[:, :2], axis=0, return_inverse=True)
-        column_of = column_of.reshape(-1)
-        order = np.argsort(column_of, kind="stable")
-        self._members = np.split(order, np.cumsum(np.bincount(column_of))[:-1])
-        self._tree = cKDTree(self.columns)
-
-    def columns_within(self, place: np.ndarray, radius: float) -> list[int]:
-        """Columns within a planar radius in m of a position (2,) m."""
-        return self._tree.query_ball_point(place, radius)
-
-    def within(self, place: np.ndarray, radius: float) -> np.ndarray:
-        """Voxels within a planar radius in m of a position (2,) m."""
-        columns = sorted(self.columns_within(place, radius))
-        return np.concatenate([self._members[c] for c in columns] or [np.empty(0, np.int64)])
-
-    def mean(self, voxels: np.ndarray) -> np.ndarray:
-        """(2,) m, mean position of voxels, weighted by their probabilities."""
-        return np.average(self.centres[voxels, :2], axis=0, weights=self.probability[voxels])
-
-    def tallest_first(self) -> np.ndarray:
-        """Columns by their number of detected levels, neighbouring columns included, highest
-        first."""
-        level = np.rint(self.centres[:, 2] / self.voxel_size).astype(int)
-        adjacent = self._tree.query_ball_point(self.columns, 1.5 * self.voxel_size)
-        levels, total = np.empty(len(self.columns)), np.empty(len(self.columns))
-        for column, neighbours in enumerate(adjacent):
-            near = np.concatenate([self._members[c] for c in sorted(neighbours)])
-            levels[column] = len(set(level[near].tolist()))
-            total[column] = self.probability[near].sum()
-        return np.lexsort((self.columns[:, 1], self.columns[:, 0], -total, -levels))
-
-
-def _axes(detected: _Detected, settings: DetectionSettings) -> Iterator[np.ndarray]:
-    """Positions (2,) m where detected voxels are above one another.
-
-    Axes with more levels come first, and each axis starts at least ``eps`` from all before it.
-    """
-    taken = np.zeros(len(detected.columns), bool)
-    for column in detected.tallest_first():
-        if taken[column]:
-            continue
-        axis = detected.columns[column]
-        for _ in range(MEAN_SHIFTS):
-            body = detected.within(axis, settings.eps / 2)
-            axis = detected.mean(body)
-        taken[detected.columns_within(axis, settings.eps)] = True
-        taken[column] = True
-        extent = np.ptp(detected.centres[body, 2]) + detected.voxel_size
-        if len(body) >= settings.min_voxels and extent >= settings.min_body:
-            yield axis
-
-
-def _neighbours_adjacent(axes: Iterable[np.ndarray]) -> list[np.ndarray]:
-    """Axes in an order that keeps neighbours adjacent, because they need the same surroundings."""
-    return sorted(axes, key=lambda axis: (*(axis // SURROUNDINGS_M), *axis))
-
-
 def _measure(
-    detected: _Detected,
+    detected: DetectedVoxels,
     axis: np.ndarray,
     around: np.ndarray,
     tau: float,
     settings: DetectionSettings,
+    *,
+    moves: bool,
 ) -> DetectedTower | None:
     """The tower on an axis (2,) m, or None if there is none.
 
     Args:
         around: (M, 3) m, centres of the occupied voxels within ``SURROUNDINGS_M``.
+        moves: whether the axis moves to the mean of the detected voxels within the reach of the
+            crossarms. Two towers that are closer than this would become one.
     """
     size, foot_radius = detected.voxel_size, settings.foot_radius
     seen = detected.within(axis, settings.eps / 2)
@@ -202,7 +166,7 @@ def _measure(
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
     for _ in range(MEAN_SHIFTS):
         seen = detected.within(axis, crossarm)
-        axis = detected.mean(seen)
+        axis = detected.mean(seen) if moves else axis
     peak = float(detected.probability[seen].max())
     axis, width, free = centre_body(around, axis, body, size)
     # The cheapest tests come first.
@@ -223,7 +187,7 @@ def _measure(
 
 
 def _without_duplicates(
-    found: list[DetectedTower], detected: _Detected, settings: DetectionSettings
+    found: list[DetectedTower], detected: DetectedVoxels, settings: DetectionSettings
 ) -> list[DetectedTower]:
     """One tower for each group of close axes, with all its detected voxels.
 

@@ -39,7 +39,7 @@ class DetectionSettings(Settings):
         9.0, ge=0, description="m; thesis 5.1.2 has towers from 18 m, wooden poles start at 9 m"
     )
     foot_radius: float = Field(
-        5.0, gt=0, description="m around the axis; the ground at the foot is measured there"
+        5.0, gt=0, description="m around the axis; voxels there show the ground at the foot"
     )
     min_upright: float = Field(
         0.75,
@@ -72,14 +72,16 @@ class DetectionSettings(Settings):
     body: float = Field(
         2.1,
         gt=0,
-        description="m around the axis, half the mean width of a tower (thesis 5.1.2): every "
-        "occupied voxel there belongs to the tower, detected or not",
+        description="m around the axis, half the mean width of a tower (thesis 5.1.2): in crops, "
+        "every occupied voxel there belongs to the tower, detected or not",
     )
     beside_body: float = Field(
-        1.0, ge=0, description="m added to half the measured width of a wider tower"
+        1.0, ge=0, description="m added to half the measured width of a wider tower in crops"
     )
     foot: float = Field(
-        1.0, ge=0, description="m above the ground; voxels below this are ground and plants"
+        1.0,
+        ge=0,
+        description="m above the ground; in crops, voxels below this are ground and plants",
     )
 
     @model_validator(mode="before")

@@ -34,15 +34,17 @@ class SurveyTower:
 
     id: int = _column("", "number in the list, from 1", heading="tower")
     x: float = _column(
-        "m", "easting of the middle of its body, in the CRS of the survey", heading="x",
+        "m", "easting of the axis of its body, in the CRS of the survey", heading="x",
         geometry=True,
     )  # fmt: skip
     y: float = _column("m", "northing of the same place", heading="y", geometry=True)
-    height: float = _column("m", "height of its top above the ground at its foot", heading="height")
+    height: float = _column("m", "height of its top above the ground at its axis", heading="height")
     base: float = _column(
-        "m", "elevation of the ground at its foot", heading="base elevation", name="base_elevation"
+        "m", "elevation of the ground at its axis", heading="base elevation", name="base_elevation"
     )
-    width: float = _column("m", "width of its body where nothing touches it", heading="width")
+    width: float = _column(
+        "m", "width of its body at half its height, of one pole for a portal", heading="width"
+    )
     conductor_directions: int = _column(
         "", "number of directions in which conductors leave it", heading="conductor directions"
     )
@@ -51,9 +53,7 @@ class SurveyTower:
         "first",
     )  # fmt: skip
     probability: float = _column("1", "highest probability of its voxels", heading="probability")
-    points: int = _column(
-        "", "points of the survey in its voxels, detected or part of its body", heading="points"
-    )
+    points: int = _column("", "its own points: body, crossarms and legs", heading="points")
     edge_distance: float = _column(
         "m", "distance to the edge of the data, at most 50 m",
         heading="distance from the edge of the data",

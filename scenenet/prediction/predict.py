@@ -31,8 +31,9 @@ if TYPE_CHECKING:
     from scenenet.models.model_file import ModelCard
 
 
-SCRATCH_BYTES = 8
-"""Bytes of temporary files for a point. Most measured on airborne and mobile surveys: 3.1."""
+SCRATCH_BYTES = 20
+"""Bytes of temporary files for a point: 12 for its position, and up to 3.1 for the voxels, measured
+on airborne and mobile surveys."""
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.core.progress import track
-from scenenet.detection.detect import DetectedTower, body_voxels, detect_towers
 from scenenet.detection.edge_distance import MAX_M, edge_distance
+from scenenet.detection.find import MeasuredTower, find_towers
 from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.structure import Structure
 from scenenet.detection.survey_tower import SurveyTower
-from scenenet.prediction.occupied_voxels import OccupiedVoxels
+from scenenet.prediction.surroundings import occupied_voxels, survey_points
 from scenenet.prediction.tiling import EDGE, Tile, TileSpool, code_of, groups
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ class TilePredictions:
         self.spool = spool
         self.geneos = tuple(geneos)
         self._folder = folder
+        self._structures: list[Structure] = []
         self._cached = lru_cache(maxsize=64)(self._read)
 
     def compute(self, model: VoxelModel, card: ModelCard, label: str) -> None:
@@ -116,22 +118,28 @@ class TilePredictions:
                 prediction.save(self._path(code_of(tile.place)))
 
     def find_towers(self, tau: float, settings: DetectionSettings) -> list[SurveyTower]:
-        """Find the towers of the survey and write the id of each into its voxels."""
+        """Find the towers of the survey and write the id of each into the voxels of its points."""
         zyx, probability, shares = self._detected(settings.threshold(tau))
-        occupied = OccupiedVoxels(self.spool)
-        found = detect_towers(
-            self.spool.centres(zyx), probability, occupied, self.spool.voxel_size, tau, settings
+        occupied, points = occupied_voxels(self.spool), survey_points(self.spool)
+        found = find_towers(
+            self.spool.centres(zyx),
+            probability,
+            occupied,
+            points,
+            self.spool.voxel_size,
+            tau,
+            settings,
         )
         towers = []
         for number, tower in enumerate(found, start=1):
             place = np.array([tower.x, tower.y])
-            around = occupied(place, MAX_M * 1.5)
-            body = around[body_voxels(tower, around, settings)]
-            at_tau = zyx[tower.voxels[probability[tower.voxels] >= tau]]
-            points = self._number(np.concatenate([body, self.spool.centres(at_tau)]), number)
-            distance = edge_distance(place, around[:, :2])
+            near = points(place, tower.structure.reach)
+            own = near[tower.structure.contains(near)]
+            self._number(own, number)
+            self._structures.append(tower.structure)
+            distance = edge_distance(place, occupied(place, MAX_M * 1.5)[:, :2])
             mean_shares = shares[tower.voxels].mean(axis=0)
-            towers.append(self._entry(tower, number, points, distance, mean_shares))
+            towers.append(self._entry(tower, number, len(own), distance, mean_shares))
         return towers
 
     def look_up(self, xyz: np.ndarray) -> PointPredictions:
@@ -146,6 +154,10 @@ class TilePredictions:
             probability[rows] = prediction.probability[at]
             tower[rows] = prediction.tower[at]
             shares[rows] = prediction.shares[at]
+        # A voxel with a tower's points may have others.
+        for number in np.unique(tower[tower > 0]).tolist():
+            rows = np.flatnonzero(tower == number)
+            tower[rows[~self._structures[number - 1].contains(xyz[rows])]] = 0
         return PointPredictions(probability, tower, shares)
 
     def _detected(self, threshold: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -163,7 +175,7 @@ class TilePredictions:
         return np.concatenate(zyx), np.concatenate(probability), np.concatenate(shares)
 
     def _entry(
-        self, tower: DetectedTower, number: int, points: int, distance: float, shares: np.ndarray
+        self, tower: MeasuredTower, number: int, points: int, distance: float, shares: np.ndarray
     ) -> SurveyTower:
         return SurveyTower(
             id=number,
@@ -182,21 +194,17 @@ class TilePredictions:
             },
         )
 
-    def _number(self, centres: np.ndarray, number: int) -> int:
-        """Write the id of a tower into its voxels, (M, 3) m, and count the points in them.
+    def _number(self, points: np.ndarray, number: int) -> None:
+        """Write the id of a tower into the voxels of its points (n, 3) m.
 
         Voxels of an earlier tower keep its id.
         """
-        points = 0
-        codes, voxels = self.spool.locate(centres)
+        codes, voxels = self.spool.locate(points)
         for code, rows in groups(codes):
             prediction = self._read(code)
             at = np.unique(np.searchsorted(prediction.voxel, voxels[rows]))
-            free = at[prediction.tower[at] == 0]
-            prediction.tower[free] = number
+            prediction.tower[at[prediction.tower[at] == 0]] = number
             prediction.save(self._path(code))
-            points += int(self.spool.tile(code).count[free].sum())
-        return points
 
     def _read(self, code: int) -> TilePrediction:
         return TilePrediction.read(self._path(code), len(self.geneos))

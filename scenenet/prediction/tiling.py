@@ -48,7 +48,7 @@ class Tile:
 
 
 class TileSpool:
-    """The occupied voxels of a survey, one file per tile."""
+    """The occupied voxels and the points of a survey, two files per tile."""
 
     def __init__(self, folder: Path, voxel_size: float) -> None:
         """Start an empty spool.
@@ -62,7 +62,7 @@ class TileSpool:
         self._codes: set[int] = set()
 
     def add(self, xyz: np.ndarray) -> None:
-        """Add points (n, 3) m to the counts of their voxels.
+        """Add points (n, 3) m to their tiles.
 
         Raises:
             InputError: a coordinate is outside the lattice.
@@ -74,6 +74,9 @@ class TileSpool:
             records["voxel"], records["count"] = voxel, count
             with self._path(code).open("ab") as stream:
                 stream.write(records.tobytes())
+            offset = xyz[rows] - self._corner(code)
+            with self._path(code, "points").open("ab") as stream:
+                stream.write(offset.astype(np.float32).tobytes())
             self._codes.add(code)
 
     def locate(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -118,6 +121,13 @@ class TileSpool:
         count = np.bincount(inverse, weights=records["count"])
         return Tile(place, voxel, count.astype(np.int32))
 
+    def points(self, code: int) -> np.ndarray:
+        """(n, 3) m, points of the tile with ``code``, to a few micrometres, in a fixed order."""
+        if code not in self._codes:
+            return np.empty((0, 3))
+        offset = np.fromfile(self._path(code, "points"), np.float32).reshape(-1, 3)
+        return offset[np.lexsort(offset.T)] + self._corner(code)
+
     def around(self, place: tuple[int, int, int], reach: tuple[int, int, int]) -> Tile:
         """A tile together with its neighbours up to ``reach`` (z, y, x) voxels away.
 
@@ -150,8 +160,12 @@ class TileSpool:
         """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
         return (zyx[:, ::-1] + 0.5) * self.voxel_size
 
-    def _path(self, code: int) -> Path:
-        return self.folder / f"{code}.voxels"
+    def _corner(self, code: int) -> np.ndarray:
+        """(3,) m, lowest x, y and z of a tile."""
+        return np.array(_decode(code)[::-1]) * (EDGE * self.voxel_size)
+
+    def _path(self, code: int, kind: str = "voxels") -> Path:
+        return self.folder / f"{code}.{kind}"
 
 
 def code_of(place: tuple[int, int, int]) -> int:

@@ -244,6 +244,6 @@ def test_of_two_axes_of_a_tower_the_free_standing_one_is_kept(lattice, pole):
     around, body = pole()
     [right] = detect(upper(body), lattice.together(lattice.ground(), around))
     wrong = replace(right, x=right.x + 3, height=right.height + 1, free=0.7)
-    detected = detection._Detected(upper(body), np.full(10, 0.9), 1.0)
+    detected = detection.DetectedVoxels(upper(body), np.full(10, 0.9), 1.0)
     [kept] = detection._without_duplicates([wrong, right], detected, DetectionSettings())
     assert (kept.x, kept.height) == (right.x, right.height)

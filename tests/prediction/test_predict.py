@@ -153,7 +153,7 @@ def test_conductors_are_listed_and_a_lone_pole_is_not_a_tower(scene, model, tmp_
     properties = tower["properties"]
     assert properties["conductor_directions"] == 2
     assert sorted(round(b) % 360 for b in properties["conductor_bearings"]) == [0, 180]
-    assert 1.0 <= properties["width"] <= 2.0
+    assert 0.4 <= properties["width"] <= 0.8
     assert set(np.unique(found.points["tower_id"])) == {0, 1}
 
 
@@ -187,7 +187,7 @@ def test_points_of_one_voxel_have_one_prediction(predicted):
     points = predicted.points
     voxels = np.floor(np.column_stack([points.x, points.y, points.z])).astype(int)
     _, voxel = np.unique(voxels, axis=0, return_inverse=True)
-    for name in ADDED:
+    for name in set(ADDED) - {"tower_id"}:  # a voxel may hold a tower and the ground beside it
         values = np.asarray(points[name], float)
         n = np.bincount(voxel)
         spread = np.bincount(voxel, values**2) / n - (np.bincount(voxel, values) / n) ** 2
@@ -203,7 +203,8 @@ def test_the_summary_describes_the_prediction(predicted, survey):
     assert summary["voxel_size_m"] == 1.0
     assert summary["kernel_size"] == [9, 9, 9]
     assert summary["settings"]["detection"] == LONE_POLES.model_dump()
-    assert summary["warnings"] == []
+    [thin] = summary["warnings"]
+    assert "points per m2" in thin
 
 
 @pytest.mark.parametrize("chunk_points", [997, 10**9])
@@ -394,6 +395,7 @@ def test_what_looks_wrong_is_in_the_summary_and_on_stderr(scene, model, tmp_path
     assert [text[:45] for text in warnings] == [
         "the coordinate system (WKT record) cannot be ",
         "the coordinates are rounded as float32 number",
+        "there are about 4.3 points per m2. Below 12 t",
     ]
     shown = capsys.readouterr().err
     assert all(f"warning: {path}: {text}" in shown for text in warnings)

@@ -1,21 +1,23 @@
-"""The occupied voxels around a position are those of a search through all voxels."""
+"""What is around a position is what a search through the whole survey finds."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from scenenet.prediction.occupied_voxels import OccupiedVoxels
+from scenenet.prediction.surroundings import occupied_voxels, survey_points
 from scenenet.prediction.tiling import TileSpool
 
 ORIGIN = np.array([544_000.0, 4_634_000.0, 80.0])
 
 
+XYZ = np.random.default_rng(0).uniform(-150, 150, (4000, 3)) + ORIGIN
+
+
 @pytest.fixture(scope="module")
 def spool(tmp_path_factory) -> TileSpool:
-    xyz = np.random.default_rng(0).uniform(-150, 150, (4000, 3)) + ORIGIN
     spool = TileSpool(tmp_path_factory.mktemp("tiles"), 1.5)
-    spool.add(xyz)
+    spool.add(XYZ)
     return spool
 
 
@@ -28,11 +30,21 @@ def everything(spool) -> np.ndarray:
 @pytest.mark.parametrize("away", [(0, 0), (-96, 96), (-149, 149), (170, 0), (900, -900)])
 def test_it_equals_a_search_through_all_voxels(spool, everything, radius, away):
     place = ORIGIN[:2] + away
-    found = OccupiedVoxels(spool)(place, radius)
+    found = occupied_voxels(spool)(place, radius)
     apart = np.hypot(*(everything[:, :2] - place).T)
     assert {tuple(v) for v in found} == {tuple(v) for v in everything[apart <= radius]}
     assert len(found) == (apart <= radius).sum()
 
 
+@pytest.mark.parametrize("radius", [3.0, 28.0])
+def test_points_are_those_of_the_survey(spool, radius):
+    found = survey_points(spool)(ORIGIN[:2], radius)
+    near = XYZ[np.hypot(*(XYZ[:, :2] - ORIGIN[:2]).T) <= radius]
+    assert len(found) == len(near)
+    np.testing.assert_allclose(
+        found[np.lexsort(found.T)], near[np.lexsort(near.T)], rtol=0, atol=1e-5
+    )
+
+
 def test_a_survey_without_points_has_none(tmp_path):
-    assert OccupiedVoxels(TileSpool(tmp_path, 1.0))(np.zeros(2), 100.0).shape == (0, 3)
+    assert occupied_voxels(TileSpool(tmp_path, 1.0))(np.zeros(2), 100.0).shape == (0, 3)

@@ -1,0 +1,91 @@
+"""Candidate axes: positions where detected voxels are above one another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from scenenet.detection.conductors import FAR, SCALES
+from scenenet.detection.settings import DetectionSettings
+
+SURROUNDINGS_M = FAR + max(SCALES)
+"""m, radius around an axis in which the survey is measured."""
+
+SAME_M = 0.5
+"""m, axes closer to one another than this are the same."""
+
+MEAN_SHIFTS = 5
+"""Number of times that an axis moves to the mean of the voxels around it; the last moves are
+small."""
+
+
+class DetectedVoxels:
+    """Detected voxels (V, 3) m, with search by position in plan."""
+
+    def __init__(self, centres: np.ndarray, probability: np.ndarray, voxel_size: float) -> None:
+        from scipy.spatial import cKDTree
+
+        self.centres, self.probability, self.voxel_size = centres, probability, voxel_size
+        self.columns, column_of = np.unique(centres[:, :2], axis=0, return_inverse=True)
+        column_of = column_of.reshape(-1)
+        order = np.argsort(column_of, kind="stable")
+        self._members = np.split(order, np.cumsum(np.bincount(column_of))[:-1])
+        self._tree = cKDTree(self.columns)
+
+    def columns_within(self, place: np.ndarray, radius: float) -> list[int]:
+        """Columns within a planar radius in m of a position (2,) m."""
+        return self._tree.query_ball_point(place, radius)
+
+    def within(self, place: np.ndarray, radius: float) -> np.ndarray:
+        """Voxels within a planar radius in m of a position (2,) m."""
+        columns = sorted(self.columns_within(place, radius))
+        return np.concatenate([self._members[c] for c in columns] or [np.empty(0, np.int64)])
+
+    def mean(self, voxels: np.ndarray) -> np.ndarray:
+        """(2,) m, mean position of voxels, weighted by their probabilities."""
+        return np.average(self.centres[voxels, :2], axis=0, weights=self.probability[voxels])
+
+    def tallest_first(self) -> np.ndarray:
+        """Columns by their number of detected levels, neighbouring columns included, highest
+        first."""
+        level = np.rint(self.centres[:, 2] / self.voxel_size).astype(int)
+        adjacent = self._tree.query_ball_point(self.columns, 1.5 * self.voxel_size)
+        levels, total = np.empty(len(self.columns)), np.empty(len(self.columns))
+        for column, neighbours in enumerate(adjacent):
+            near = np.concatenate([self._members[c] for c in sorted(neighbours)])
+            levels[column] = len(set(level[near].tolist()))
+            total[column] = self.probability[near].sum()
+        return np.lexsort((self.columns[:, 1], self.columns[:, 0], -total, -levels))
+
+
+def axes(
+    detected: DetectedVoxels, settings: DetectionSettings, apart: float
+) -> Iterator[np.ndarray]:
+    """Positions (2,) m where detected voxels are above one another.
+
+    Axes with more levels come first, and each axis starts at least ``apart`` m from all before it.
+    """
+    found: list[np.ndarray] = []
+    taken = np.zeros(len(detected.columns), bool)
+    for column in detected.tallest_first():
+        if taken[column]:
+            continue
+        axis = detected.columns[column]
+        for _ in range(MEAN_SHIFTS):
+            body = detected.within(axis, settings.eps / 2)
+            axis = detected.mean(body)
+        taken[detected.columns_within(axis, apart)] = True
+        taken[column] = True
+        extent = np.ptp(detected.centres[body, 2]) + detected.voxel_size
+        if len(body) < settings.min_voxels or extent < settings.min_body:
+            continue
+        # The mean of neighbouring columns is often the same.
+        if all(np.hypot(*(axis - other)) > SAME_M for other in found):
+            found.append(axis)
+            yield axis
+
+
+def neighbours_adjacent(axes: Iterable[np.ndarray]) -> list[np.ndarray]:
+    """Axes in an order that keeps neighbours adjacent, because they need the same surroundings."""
+    return sorted(axes, key=lambda axis: (*(axis // SURROUNDINGS_M), *axis))

@@ -1,0 +1,171 @@
+"""Towers of a survey: candidates from voxels, measured and decided in points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenenet.detection.candidates import SAME_M, SURROUNDINGS_M, DetectedVoxels
+from scenenet.detection.conductors import FAR
+from scenenet.detection.detect import (
+    DetectedTower,
+    Surroundings,
+    highest_probability,
+    measured_axes,
+)
+from scenenet.detection.following import FURTHEST_M, leads_on
+from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.structure import BodyTests, Structure, measure_structure
+
+LOOSE = 0.75
+"""Share of the thresholds that a rough measurement in voxels has to reach."""
+
+WIDE = 1.8
+"""Share of the usual reach of crossarms that is tried where no tower is found with it: the head of
+a window tower is nearly as wide as half its height."""
+
+CLEAR = 0.6
+"""Share of free levels from which a body at the rough axis is not doubted."""
+
+CLEAR_NEEDS = 0.5
+"""Share of ``min_conductor`` that such a body needs: vegetation never stands so free."""
+
+MIN_AMID = 0.5
+"""Smallest length of conductors, the sum of ``Span.followed``, amid which an axis is looked for."""
+
+MIN_FREE = 1 / 3
+"""Smallest share of the levels at which the body stands free, by points."""
+
+APART_M = 2.0
+"""m, smallest distance between two towers, measured in points."""
+
+
+@dataclass(frozen=True)
+class MeasuredTower(DetectedTower):
+    """A tower, measured in points.
+
+    Attributes:
+        structure: its shape, which says which points are its own.
+    """
+
+    structure: Structure
+
+    def moved(self, offset: np.ndarray) -> MeasuredTower:
+        """The same tower elsewhere; ``offset`` is (3,) m."""
+        x, y, z = offset.tolist()
+        structure = self.structure.moved(x, y, z)
+        return replace(self, x=self.x + x, y=self.y + y, base=self.base + z, structure=structure)
+
+
+def find_towers(
+    centres: np.ndarray,
+    probability: np.ndarray,
+    surroundings: Surroundings,
+    points: Surroundings,
+    voxel_size: float,
+    tau: float,
+    settings: DetectionSettings,
+) -> list[MeasuredTower]:
+    """Find the towers among detected voxels and measure each in points, highest probability first.
+
+    Voxels give approximate axes, by tests that are less strict than those of ``detect_towers``. The
+    points around an axis then decide, so that the result hardly depends on where the borders of the
+    voxels lie.
+
+    Args:
+        centres, probability, surroundings, voxel_size, tau: as in ``detect_towers``.
+        points: gives the points around a position.
+    """
+    if len(centres) == 0:
+        return []
+    offset = centres.min(axis=0)
+    detected = DetectedVoxels(centres - offset, probability, voxel_size)
+    loose = settings.model_copy(
+        update={
+            "min_height": LOOSE * settings.min_height,
+            "min_upright": LOOSE * settings.min_upright,
+            "min_conductor": LOOSE / 2 * settings.min_conductor,
+            "min_free": 0.0,
+        }
+    )
+    found: list[MeasuredTower] = []
+    rough: list[DetectedTower] = []
+    for tower in measured_axes(
+        detected, offset, surroundings, tau, settings, settings.eps / 2, loose
+    ):
+        if all(np.hypot(tower.x - r.x, tower.y - r.y) > SAME_M for r in rough):
+            rough.append(tower)
+            found += _in_points(tower, surroundings, points, offset, voxel_size, tau, settings)
+    towers = _distinct(found)
+    return sorted((tower.moved(offset) for tower in towers), key=highest_probability)
+
+
+def _in_points(
+    rough: DetectedTower,
+    surroundings: Surroundings,
+    points: Surroundings,
+    offset: np.ndarray,
+    voxel_size: float,
+    tau: float,
+    settings: DetectionSettings,
+) -> list[MeasuredTower]:
+    """The towers that the points show near a rough one, relative to ``offset``.
+
+    There may be two: one at the rough axis, and one amid the conductors, where the axis of a window
+    tower is.
+    """
+    axis = np.array([rough.x, rough.y])
+    near = points(axis + offset[:2], SURROUNDINGS_M) - offset
+    sure = rough.probability >= tau
+    tests = BodyTests(settings.min_height, settings.min_upright, MIN_FREE)
+    needed = settings.min_conductor * (1 if sure else 2)
+    found: list[MeasuredTower] = []
+    # Without conductors there is nothing to be amid of.
+    carries = sum(span.followed for span in rough.spans) >= max(needed, MIN_AMID)
+    for amid in (False, True) if carries else (False,):
+        share = settings.crossarm * (WIDE if amid else 1)
+        crossarm = max(settings.eps / 2, share * rough.height)
+        shape = measure_structure(near, axis, rough.height, rough.spans, crossarm, tests, amid)
+        if shape is None:
+            continue
+        enough = needed * (CLEAR_NEEDS if shape.profile.free >= CLEAR else 1)
+        if not shape.carries(enough):
+            continue
+        place = np.array([shape.x, shape.y])
+        far = surroundings(place + offset[:2], FURTHEST_M + FAR) - offset
+        base = shape.ground.elevation
+        spans = tuple(s for s in shape.spans if leads_on(s, place, base, far, voxel_size))
+        if not replace(shape, spans=spans).carries(enough):
+            continue
+        if any(np.hypot(shape.x - other.x, shape.y - other.y) <= APART_M for other in found):
+            continue
+        found.append(
+            MeasuredTower(
+                x=shape.x,
+                y=shape.y,
+                base=base,
+                height=shape.height,
+                width=shape.profile.width,
+                free=shape.profile.free,
+                upright=shape.upright,
+                spans=spans,
+                probability=rough.probability,
+                voxels=rough.voxels,
+                structure=shape,
+            )
+        )
+    return found
+
+
+def _distinct(found: list[MeasuredTower]) -> list[MeasuredTower]:
+    """One tower for each structure: several axes may have led to it."""
+    towers: list[MeasuredTower] = []
+    for tower in sorted(found, key=lambda t: (-t.free * t.upright * t.height, t.x, t.y)):
+        wide = tower.width / 2
+        if all(
+            np.hypot(tower.x - t.x, tower.y - t.y) > max(APART_M, wide + t.width / 2)
+            for t in towers
+        ):
+            towers.append(tower)
+    return towers

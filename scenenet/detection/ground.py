@@ -1,0 +1,97 @@
+"""The ground at the foot of a tower, from points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+RADIUS_M = 6.0
+"""m around the axis in which the ground is fitted; wider, the curvature of a hill counts."""
+
+CELL_M = 0.75
+"""m, cells of which only the lowest point counts: returns from the ground are at least this dense
+under open crowns at a few pulses per square metre."""
+
+QUANTILE = 0.25
+"""Share of the lowest points below the fitted plane. Most cells see the ground or grass; the rest
+end in crowns, and a few returns lie below the ground."""
+
+NEAR_M = 2.5
+"""m around the axis in which the plane is moved up or down to the ground that is there."""
+
+STEEPEST = 1.2
+"""Largest slope of the ground at a tower."""
+
+SPREAD_M = 1.5
+"""m from the plane; lowest points further away are not on the ground."""
+
+SEEN_M, SEEN = 0.5, 0.5
+"""m, and the smallest share of the cells whose lowest point is this close to the plane. With fewer,
+the ground is not in the data, as in a tower that was cut out; its lowest points are the foot."""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground around an axis, as a plane.
+
+    Attributes:
+        elevation: m, at the axis.
+        slope: (2,) rise in m per m eastwards and northwards.
+    """
+
+    elevation: float
+    slope: np.ndarray
+
+    def height(self, offset: np.ndarray) -> np.ndarray:
+        """(N,) m above the ground of points (N, 3): planar offset from the axis, elevation."""
+        return offset[:, 2] - self.elevation - offset[:, :2] @ self.slope
+
+
+def fit_ground(offset: np.ndarray) -> Ground:
+    """The ground around an axis.
+
+    A plane through the lower points, by quantile regression, so that neither crowns nor single
+    returns from below move it.
+
+    Args:
+        offset: (N, 3) m, planar offset from the axis and elevation; at least one point.
+    """
+    near = offset[np.hypot(offset[:, 0], offset[:, 1]) <= RADIUS_M]
+    low = _lowest(near if len(near) else offset)
+    distance = np.hypot(low[:, 0], low[:, 1])
+    design = np.column_stack([low[:, :2], np.ones(len(low))])
+    middle = float(np.percentile(low[:, 2], 100 * QUANTILE))
+    z = low[:, 2] - middle
+    nearness = np.exp(-0.5 * (distance / (2 * RADIUS_M / 3)) ** 2)
+    # Without points around the axis the slope stays level.
+    level = np.diag([1e-3, 1e-3, 1e-9])
+    plane = np.zeros(3)
+    for _ in range(30):
+        residual = z - design @ plane
+        weight = np.where(residual > 0, QUANTILE, 1 - QUANTILE) / np.maximum(np.abs(residual), 0.1)
+        weighted = design * (weight * nearness)[:, None]
+        change = np.linalg.solve(weighted.T @ design + level, weighted.T @ z) - plane
+        plane = plane + change
+        if np.abs(change).max() < 1e-3:
+            break
+    steep = float(np.hypot(plane[0], plane[1]))
+    if steep > STEEPEST:
+        plane[:2] *= STEEPEST / steep
+    residual = z - design @ plane
+    there = residual[(distance <= NEAR_M) & (np.abs(residual) < SPREAD_M)]
+    if len(there) >= 4:
+        plane[2] += np.percentile(there, 35)
+    if (np.abs(z - design @ plane) < SEEN_M).mean() < SEEN:
+        every = near if len(near) else offset
+        plane[2] = np.percentile(every[:, 2] - middle - every[:, :2] @ plane[:2], 1)
+    return Ground(middle + float(plane[2]), plane[:2])
+
+
+def _lowest(offset: np.ndarray) -> np.ndarray:
+    """The lowest point of each cell, (M, 3)."""
+    cells = np.floor(offset[:, :2] / CELL_M).astype(np.int64)
+    order = np.lexsort((offset[:, 2], cells[:, 1], cells[:, 0]))
+    cells = cells[order]
+    first = np.append(True, (np.diff(cells, axis=0) != 0).any(axis=1))
+    return np.asarray(offset[order[first]])

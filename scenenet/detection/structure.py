@@ -1,0 +1,419 @@
+"""The structure of a tower: which points are its own.
+
+A tower is measured in the points around the axis that the voxels gave. The result is a
+shape and not a list of points: a tapered body, crossarms in a plane across the line, and the ground
+below. Any point of the survey can be asked whether it lies in the shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenenet.detection.conductors import Span, leaving_spans, thin_share
+from scenenet.detection.ground import Ground, fit_ground
+from scenenet.detection.head import AIR_M, ARM_M, NO_HEAD, Head, find_head
+from scenenet.detection.profile import GAP_M, Profile, fit_profile
+
+MARGIN_M = 0.1
+"""m around members: noise of ranging and of the axis."""
+
+FOOT_M = 0.5
+"""m above the ground below which grass and scrub cannot be told from the foot of a tower."""
+
+SCRUB_TOP_M = 3.0
+"""m above the ground, highest scrub around a foot."""
+
+SCRUB_M = 1.0
+"""m above the ground from which a body is measured."""
+
+MIN_THIN = 0.5
+"""Smallest share of the points of a span that are on thin lines."""
+
+OVER_M = 1.0
+"""m above the top that the lowest conductor may pass. Over a tree it passes higher."""
+
+BESIDE_M, BESIDE = 1.5, 0.05
+"""Largest distance of the axis from the nearest conductor if all pass on one side, as on a
+flag-shaped head: m for a pole, and share of the height for a wider body. Trees beside a line are
+further away."""
+
+POLE_M = 1.2
+"""m, largest width of a pole."""
+
+BELOW_ARM = 0.08
+"""Share of the height below the lowest conductor at which struts of a crossarm may start."""
+
+PEAK_M = 1.5
+"""m above the highest conductor that the top of a tower may be."""
+
+SPARSE = 0.8
+"""Share of the height in voxels up to which conductors are looked for at least."""
+
+TWIN = 0.25
+"""Largest distance between the poles of a portal as a share of the height; the poles of two lines
+are further apart."""
+
+TWIN_WIDTH_M = 0.6
+"""m, largest half width of a pole of a portal."""
+
+TWIN_UPRIGHT, TWIN_FREE = 0.6, 0.4
+"""Smallest share of the levels at which the second pole has points, and stands free."""
+
+BEAM, BEAM_SEEN = 0.5, 0.75
+"""Share of the height above which there is a beam, and smallest share of its length with points."""
+
+UPRIGHT_M = 1.5
+"""m, smallest height of the levels in which a body has to be unbroken."""
+
+TOP_GAP = 3.0
+"""m without a point that end a body upwards, so that a bird above it is not its top."""
+
+OPPOSITE = 120.0
+"""degrees; two spans further apart than this are the two sides of one line."""
+
+SIZE_M = 1.0
+"""m, voxels in which conductors are followed, on a lattice that is centred on the axis: what is
+found there does not depend on where the voxels of the survey lie."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """The shape of a tower.
+
+    Attributes:
+        x, y: m, axis.
+        ground: the ground around the axis.
+        height: m, from the ground to the top.
+        foot: m above the ground from which points are the tower's own; scrub is below.
+        along: (2,) unit vector along the line.
+        profile: the body around the axis; its s and t are 0.
+        head: the crossarms.
+        apart: m, half the distance between the two bodies of a portal, which stand to the left and
+            right of the axis; 0 for one body.
+        upright: share of the levels of the body that have a point.
+        spans: directions in which conductors leave.
+    """
+
+    x: float
+    y: float
+    ground: Ground
+    height: float
+    foot: float
+    along: np.ndarray
+    profile: Profile
+    upright: float
+    head: Head
+    spans: tuple[Span, ...]
+    apart: float = 0.0
+
+    @property
+    def reach(self) -> float:
+        """m, largest planar distance of a point of the tower from the axis."""
+        wide = self.profile.foot + self.apart + MARGIN_M
+        return float(np.hypot(max(self.head.reach, wide), wide + ARM_M))
+
+    def moved(self, x: float, y: float, z: float) -> Structure:
+        """The same shape elsewhere, m."""
+        ground = replace(self.ground, elevation=self.ground.elevation + z)
+        return replace(self, x=self.x + x, y=self.y + y, ground=ground)
+
+    def carries(self, length: float) -> bool:
+        """Whether it carries conductors of this ``length``, the sum of ``Span.followed``.
+
+        They are thin, the lowest is not above its top, and they pass the axis on both sides, or
+        close to it on one.
+        """
+        if length == 0:
+            return True
+        conductors = tuple(span for span in self.spans if span.thin >= MIN_THIN)
+        if sum(span.followed for span in conductors) < length:
+            return False
+        if min(span.lowest for span in conductors) > self.height + OVER_M:
+            return False
+        sides = _sides(conductors, np.array([self.along[1], -self.along[0]]))
+        limit = BESIDE_M if self.profile.width <= POLE_M else BESIDE * self.height
+        return max(min(sides), -max(sides)) <= limit
+
+    def contains(self, xyz: np.ndarray) -> np.ndarray:
+        """(N,) bool, which points (N, 3) m are the tower's own."""
+        s, t, h = _frame(xyz, np.array([self.x, self.y]), self.along, self.ground)
+        return self._body(s, t, h) | self._arm(s, t, h)
+
+    def _body(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        half = self.profile.half_width(h) + MARGIN_M
+        inside = np.maximum(np.abs(s), np.abs(np.abs(t) - self.apart)) <= half
+        return inside & (h >= self.foot) & (h <= self.height + MARGIN_M)
+
+    def _arm(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        return (np.abs(s) <= self.head.thick) & self.head.covers(t, h)
+
+
+@dataclass(frozen=True)
+class BodyTests:
+    """What a body has to be to belong to a tower.
+
+    Attributes:
+        height: m, smallest height.
+        upright: smallest share of the levels with a point.
+        free: smallest share of the levels at which it stands free.
+    """
+
+    height: float
+    upright: float
+    free: float
+
+    def passed(self, body: Structure) -> bool:
+        return (
+            body.height >= self.height
+            and body.upright >= self.upright
+            and body.profile.free >= self.free
+        )
+
+
+def measure_structure(
+    points: np.ndarray,
+    axis: np.ndarray,
+    height: float,
+    spans: tuple[Span, ...],
+    crossarm: float,
+    tests: BodyTests,
+    amid: bool,
+) -> Structure | None:
+    """The structure at an approximate axis, or None where no body stands free.
+
+    Args:
+        points: (N, 3) m, within ``FAR + max(SCALES)`` of the axis in plan.
+        axis: (2,) m, approximate.
+        height: m above the ground, approximate.
+        spans: conductors that leave, as far as they are known.
+        crossarm: m, largest distance at which a conductor passes the axis.
+        tests: what a body has to be; conductors are only looked for where it is.
+        amid: whether the axis is looked for amid the conductors and not where it is thought to be.
+    """
+    start = axis + _middle(spans) if amid else axis
+    first = _measure_body(points, start, _along(spans), height)
+    if first is None or not (amid or tests.passed(first)):
+        return None
+    origin = np.array([first.x, first.y])
+    # Few returns may leave a gap below the head, which the conductors then show.
+    top = max(first.height, SPARSE * height)
+    spans = tuple(
+        replace(span, thin=thin_share(points, span, SIZE_M))
+        for span in leaving_spans(
+            _voxels(points, origin),
+            (first.x, first.y),
+            first.ground.elevation,
+            top,
+            crossarm,
+            SIZE_M,
+        )
+    )
+    # Now the direction of the line is known from the points.
+    start = origin + _middle(spans) if amid else origin
+    body = _measure_body(points, start, _along(spans), height if amid else first.height + 1)
+    if body is None or not tests.passed(body):
+        return None
+    return _with_head(_with_twin(body, points), points, spans, origin)
+
+
+def _measure_body(
+    points: np.ndarray, axis: np.ndarray, along: np.ndarray, height: float
+) -> Structure | None:
+    """The body near an axis, without crossarms and conductors."""
+    s, t, h = _frame(points, axis, along, fit_ground(points - [*axis, 0]))
+    profile = fit_profile(s, t, h, SCRUB_M, height)
+    if profile is None:
+        return None
+    axis = axis + profile.s * along + profile.t * np.array([along[1], -along[0]])
+    profile = replace(profile, s=0.0, t=0.0)
+    ground = fit_ground(points - [*axis, 0])
+    s, t, h = _frame(points, axis, along, ground)
+    half = profile.half_width(h) + MARGIN_M
+    inside = np.maximum(np.abs(s), np.abs(t)) <= half
+    foot = _foot(s, t, h, profile)
+    top, upright = _top(h[inside & (h >= foot)], height, profile.level, foot)
+    if top is None:
+        return None
+    x, y = axis.tolist()
+    return Structure(x, y, ground, top, foot, along, profile, upright, NO_HEAD, ())
+
+
+def _with_twin(body: Structure, points: np.ndarray) -> Structure:
+    """The body, or both bodies of a portal: two poles across the line with a beam between them."""
+    if body.profile.foot > TWIN_WIDTH_M:
+        return body
+    s, t, h = _frame(points, np.array([body.x, body.y]), body.along, body.ground)
+    level = body.profile.level
+    n_levels = int(body.height / level)
+    near = (np.abs(s) <= TWIN_WIDTH_M / 2) & (h >= SCRUB_M) & (h < n_levels * level)
+    furthest = TWIN * body.height
+    step = 0.2
+    n = int(furthest / step)
+    column = np.rint(t[near] / step).astype(int)
+    inside = np.abs(column) <= n
+    seen = np.zeros((2 * n + 1, n_levels), bool)
+    seen[column[inside] + n, (h[near][inside] / level).astype(int)] = True
+    # A pole and the noise of its points take up two or three columns.
+    wide = seen.copy()
+    wide[1:] |= seen[:-1]
+    wide[:-1] |= seen[1:]
+    for column in np.argsort(-wide.sum(axis=1), kind="stable"):
+        at = (column - n) * step
+        if wide[column].mean() < TWIN_UPRIGHT:
+            break
+        if abs(at) < 2 * TWIN_WIDTH_M:
+            continue
+        twin = fit_profile(s, t - at, h, SCRUB_M, body.height)
+        if twin is None or max(abs(twin.s), abs(twin.t)) > TWIN_WIDTH_M / 2:
+            continue
+        at += twin.t
+        if twin.free >= TWIN_FREE and twin.foot <= TWIN_WIDTH_M and _beam(s, t, h, at, body):
+            return _portal(body, points, at)
+    return body
+
+
+def _beam(s: np.ndarray, t: np.ndarray, h: np.ndarray, at: float, body: Structure) -> bool:
+    """Whether something thin leads across from the axis to a pole at ``at`` m beside it."""
+    low, high = sorted((0.0, at))
+    between = (t > low + 0.5) & (t < high - 0.5) & (h >= BEAM * body.height)
+    between &= h <= body.height + PEAK_M
+    n = max(int((high - low - 1.0) / 0.5), 1)
+    place = np.minimum(((t - low - 0.5) / 0.5), n - 1).astype(int)
+    beam = between & (np.abs(s) <= ARM_M)
+    air = between & (np.abs(s) > 2 * ARM_M) & (np.abs(s) <= 2 * ARM_M + AIR_M)
+    return bool(
+        len(np.unique(place[beam])) >= BEAM_SEEN * n and beam.sum() / ARM_M > air.sum() / AIR_M
+    )
+
+
+def _portal(body: Structure, points: np.ndarray, at: float) -> Structure:
+    """The portal of a body and its twin ``at`` m to the right of it."""
+    across = np.array([body.along[1], -body.along[0]])
+    x, y = (np.array([body.x, body.y]) + at / 2 * across).tolist()
+    ground = fit_ground(points - [x, y, 0])
+    top = body.height + body.ground.elevation + float(body.ground.slope @ (across * at / 2))
+    return replace(body, x=x, y=y, ground=ground, apart=abs(at) / 2, height=top - ground.elevation)
+
+
+def _with_head(
+    body: Structure, points: np.ndarray, spans: tuple[Span, ...], origin: np.ndarray
+) -> Structure:
+    """The body with its crossarms, which the conductors show.
+
+    Args:
+        origin: (2,) m, the axis that the spans are relative to.
+    """
+    s, t, h = _frame(points, np.array([body.x, body.y]), body.along, body.ground)
+    across = np.array([body.along[1], -body.along[0]])
+    moved = float((origin - np.array([body.x, body.y])) @ across)
+    line = tuple(
+        span
+        for span in spans
+        if span.thin >= MIN_THIN
+        and abs(_unit(span.bearing) @ body.along) > np.cos(np.radians(45.0))
+    )
+    if not line:
+        return replace(body, spans=spans)
+    sides = [side + moved for side in _sides(line, across)]
+    lowest = min(span.lowest for span in line) - BELOW_ARM * body.height
+    lowest = max(lowest, body.height / 2)
+    highest = max(body.height, *(span.highest for span in line))
+    reach = max(abs(side) for side in sides)
+    head = find_head(s, t, h, body.profile, body.apart, lowest, highest, reach)
+    shape = replace(body, spans=spans, head=head, height=highest + PEAK_M)
+    top = max(body.height, float(h[shape._arm(s, t, h)].max(initial=0.0)))
+    return replace(shape, height=top)
+
+
+def _foot(s: np.ndarray, t: np.ndarray, h: np.ndarray, profile: Profile) -> float:
+    """m above the ground up to which vegetation is as dense around the body as in it."""
+    half = profile.half_width(h) + MARGIN_M
+    distance = np.maximum(np.abs(s), np.abs(t))
+    levels = np.arange(FOOT_M, SCRUB_TOP_M, FOOT_M)
+    foot = FOOT_M
+    for level in levels:
+        at = (h >= level) & (h < level + FOOT_M)
+        inside = (at & (distance <= half)).sum()
+        around = (at & (distance > half) & (distance <= half + GAP_M)).sum()
+        width = float(profile.half_width(np.array([level]))[0]) + MARGIN_M
+        areas = width**2 / ((width + GAP_M) ** 2 - width**2)
+        if 2 * around * areas > inside:
+            foot = float(level + FOOT_M)
+    return foot
+
+
+def _frame(
+    xyz: np.ndarray, axis: np.ndarray, along: np.ndarray, ground: Ground
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """s along the line, t to its right, h above the ground, each (N,) m."""
+    offset = xyz - np.array([*axis, 0.0])
+    s = offset[:, :2] @ along
+    t = offset[:, 0] * along[1] - offset[:, 1] * along[0]
+    return s, t, ground.height(offset)
+
+
+def _along(spans: tuple[Span, ...]) -> np.ndarray:
+    """Unit vector (2,) along the line, across the crossarms: north if there is no conductor."""
+    if not spans:
+        return np.array([0.0, 1.0])
+    first = _unit(spans[0].bearing)
+    for other in spans[1:]:
+        second = _unit(other.bearing)
+        if first @ second < np.cos(np.radians(OPPOSITE)):
+            both = first - second
+            return both / np.linalg.norm(both)
+    return first
+
+
+def _unit(bearing: float) -> np.ndarray:
+    return np.array([np.sin(np.radians(bearing)), np.cos(np.radians(bearing))])
+
+
+def _sides(spans: tuple[Span, ...], across: np.ndarray) -> list[float]:
+    """m, where the outermost conductors of each span pass the tower, to the right of the line."""
+    sides = []
+    for span in spans:
+        u = _unit(span.bearing)
+        right = np.array([u[1], -u[0]])
+        sides += [span.left * float(right @ across), span.right * float(right @ across)]
+    return sides
+
+
+def _middle(spans: tuple[Span, ...]) -> np.ndarray:
+    """(2,) m, from the axis to the middle of the conductors."""
+    along = _along(spans)
+    across = np.array([along[1], -along[0]])
+    sides = _sides(spans, across)
+    return (min(sides) + max(sides)) / 2 * across if sides else np.zeros(2)
+
+
+def _top(h: np.ndarray, height: float, level: float, foot: float) -> tuple[float | None, float]:
+    """Height of the top in m, and the share of the levels between ``foot`` and it with a point.
+
+    Args:
+        h: (N,) m above the ground, points of the body from ``foot`` upwards.
+        height: m, approximate.
+        level: m, height of the levels in which a gap is looked for.
+    """
+    if len(h) == 0:
+        return None, 0.0
+    levels = np.unique(np.floor(h / level).astype(int))
+    start = levels[np.argmin(np.abs(levels - height / (2 * level)))]
+    above = levels[levels >= start]
+    breaks = np.flatnonzero(np.diff(above) > max(TOP_GAP / level, 1))
+    last = above[breaks[0]] if len(breaks) else above[-1]
+    top = float(h[np.floor(h / level).astype(int) <= last].max())
+    tall = max(level, UPRIGHT_M)
+    below = h[h <= top]
+    n_levels = max(int(np.ceil((top - foot) / tall)), 1)
+    seen = np.unique(np.minimum(((below - foot) / tall).astype(int), n_levels - 1))
+    return top, len(seen) / n_levels
+
+
+def _voxels(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """(M, 3) m, centres of the occupied voxels on a lattice with the axis at a centre."""
+    origin = np.array([*axis, 0.0])
+    steps = np.unique(np.rint((points - origin) / SIZE_M).astype(np.int64), axis=0)
+    return steps * SIZE_M + origin

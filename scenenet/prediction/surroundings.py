@@ -1,0 +1,52 @@
+"""The occupied voxels and the points of a survey, looked up by place."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from scenenet.prediction.tiling import EDGE, TileSpool
+
+KEPT_TILES = 64
+"""Tiles kept in memory: successive look-ups mostly need the same ones."""
+
+
+class SurveySurroundings:
+    """What is near a place; each tile is read when a look-up needs it."""
+
+    def __init__(self, spool: TileSpool, read: Callable[[int], np.ndarray]) -> None:
+        """Start with no tile in memory.
+
+        Args:
+            read: gives the positions (n, 3) m in the tile with a code.
+        """
+        self._edge = EDGE * spool.voxel_size
+        self._above: dict[tuple[int, int], list[int]] = defaultdict(list)
+        for code, (_, y, x) in spool.places():
+            self._above[x, y].append(code)
+        self._positions = lru_cache(maxsize=KEPT_TILES)(read)
+
+    def __call__(self, place: np.ndarray, radius: float) -> np.ndarray:
+        """(M, 3) m, the positions within a planar radius in m of a place (2,)."""
+        low, high = (np.floor((place + r) / self._edge).astype(int) for r in (-radius, radius))
+        near = [np.empty((0, 3))]
+        for x in range(low[0], high[0] + 1):
+            for y in range(low[1], high[1] + 1):
+                for code in self._above.get((x, y), ()):
+                    positions = self._positions(code)
+                    apart = np.hypot(positions[:, 0] - place[0], positions[:, 1] - place[1])
+                    near.append(positions[apart <= radius])
+        return np.concatenate(near)
+
+
+def occupied_voxels(spool: TileSpool) -> SurveySurroundings:
+    """The centres of the occupied voxels."""
+    return SurveySurroundings(spool, lambda code: spool.centres(spool.tile(code).zyx()))
+
+
+def survey_points(spool: TileSpool) -> SurveySurroundings:
+    """The points."""
+    return SurveySurroundings(spool, spool.points)

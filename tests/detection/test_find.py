@@ -1,0 +1,104 @@
+"""Towers found with voxels and measured in points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenenet.detection.detect import surroundings_in
+from scenenet.detection.find import find_towers
+from scenenet.detection.settings import DetectionSettings
+
+TAU, SIZE = 0.5, 1.0
+
+
+def find(xyz, feet, *, phase=(0.0, 0.0, 0.0), probability=0.9, height=15.0, **changes):
+    """The towers when the voxels above each of ``feet`` are detected."""
+    steps = np.unique(np.floor((xyz - phase) / SIZE), axis=0)
+    occupied = (steps + 0.5) * SIZE + phase
+    detected = np.zeros(len(occupied), bool)
+    for foot in feet:
+        near = np.hypot(*(occupied[:, :2] - foot[:2]).T) <= 0.9
+        level = occupied[:, 2] - foot[2]
+        detected |= near & (level > 3) & (level < height)
+    centres = occupied[detected]
+    return find_towers(
+        centres,
+        np.full(len(centres), probability),
+        surroundings_in(occupied),
+        surroundings_in(xyz),
+        SIZE,
+        TAU,
+        DetectionSettings(**changes),
+    )
+
+
+def test_a_tower_is_found_with_its_own_points(tower_scene):
+    scene = tower_scene("tubular", 18.0)
+    (tower,) = find(scene.xyz, [scene.foot])
+    assert np.hypot(tower.x - scene.foot[0], tower.y - scene.foot[1]) < 0.15
+    assert tower.base == pytest.approx(scene.foot[2], abs=0.2)
+    assert tower.height == pytest.approx(18.0, abs=0.3)
+    assert sorted(round(span.bearing) for span in tower.spans) == pytest.approx([30, 210], abs=4)
+    own = tower.structure.contains(scene.xyz)
+    assert (own & scene.tower).sum() > 0.9 * own.sum()
+
+
+@pytest.mark.parametrize("phase", [(0, 0, 0), (0.5, 0, 0), (0, 0.5, 0.5), (0.5, 0.5, 0.25)])
+def test_the_borders_of_the_voxels_do_not_matter(tower_scene, phase):
+    scene = tower_scene("lattice_pole", 17.0)
+    (here,) = find(scene.xyz, [scene.foot])
+    (there,) = find(scene.xyz, [scene.foot], phase=phase)
+    assert (there.x, there.y) == pytest.approx((here.x, here.y), abs=0.1)
+    assert (there.base, there.height) == pytest.approx((here.base, here.height), abs=0.15)
+
+
+def test_a_pole_without_conductors_is_no_tower_unless_that_is_allowed(tower_scene):
+    scene = tower_scene("tubular", 18.0, bearings=())
+    assert find(scene.xyz, [scene.foot]) == []
+    assert len(find(scene.xyz, [scene.foot], min_conductor=0.0)) == 1
+
+
+def test_a_mast_with_a_boom_that_ends_in_the_air_is_no_tower(tower_scene):
+    scene = tower_scene("tubular", 18.0, bearings=())
+    s = np.arange(0, 20, 0.05)
+    boom = scene.foot + np.column_stack([s, np.zeros(len(s)), np.full(len(s), 17.5)])
+    assert find(np.concatenate([scene.xyz, boom]), [scene.foot]) == []
+
+
+def test_two_towers_six_metres_apart_are_two(tower_scene):
+    one = tower_scene("tubular", 22.0, bearing=0.0)
+    other = tower_scene("tubular", 22.0, bearing=0.0, ground=False, seed=1,
+                        foot=(one.foot[0] + 6.4, one.foot[1], one.foot[2]))  # fmt: skip
+    towers = find(np.concatenate([one.xyz, other.xyz]), [one.foot, other.foot], height=20.0)
+    assert len(towers) == 2
+    places = sorted((tower.x, tower.y) for tower in towers)
+    assert places[0] == pytest.approx(one.foot[:2], abs=0.3)
+    assert places[1] == pytest.approx(other.foot[:2], abs=0.3)
+
+
+def test_a_portal_is_one_tower(tower_scene):
+    scene = tower_scene("h_frame", 18.0)
+    across = 1.8 * np.array([np.sin(np.radians(120)), np.cos(np.radians(120)), 0])
+    (tower,) = find(scene.xyz, [scene.foot + across, scene.foot - across])
+    assert np.hypot(tower.x - scene.foot[0], tower.y - scene.foot[1]) < 0.3
+
+
+def test_a_tree_under_the_conductors_is_no_tower(tower_scene):
+    trees = ((2.0, 9.0, 13.0),)
+    scene = tower_scene("tubular", 18.0, bearing=0.0, trees=trees)
+    tree = scene.foot + np.array([2.0, 9.0, 0.0])
+    towers = find(scene.xyz, [scene.foot, tree], height=12.0)
+    assert len(towers) == 1
+
+
+def test_below_tau_conductors_have_to_leave_in_two_directions(tower_scene):
+    both = tower_scene("tubular", 18.0)
+    assert len(find(both.xyz, [both.foot], probability=0.4)) == 1
+    one = tower_scene("tubular", 18.0, bearings=(30.0,))
+    assert find(one.xyz, [one.foot], probability=0.4, min_conductor=1.5) == []
+
+
+def test_nothing_detected_is_no_tower(tower_scene):
+    scene = tower_scene("tubular", 18.0)
+    assert find(scene.xyz, []) == []

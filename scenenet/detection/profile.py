@@ -20,6 +20,9 @@ SLIM = 1 / 8
 SLIM_M = 2.0
 """m, largest half width of a low tower, such as a portal of two poles."""
 
+SCRUB_M = 1.0
+"""m above the ground from which a body is measured, above grass and scrub."""
+
 NARROWEST_M = 0.2
 """m, smallest half width: a pole with the noise of its points."""
 
@@ -81,17 +84,14 @@ def slim(height: float) -> float:
     return max(SLIM_M, SLIM * height)
 
 
-def fit_profile(
-    s: np.ndarray, t: np.ndarray, h: np.ndarray, lowest: float, height: float
-) -> Profile | None:
+def fit_profile(s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float) -> Profile | None:
     """The body near an approximate axis, or None where nothing stands free.
 
     Args:
         s, t, h: (N,) m.
-        lowest: m above the ground from which the body is measured, above grass and scrub.
         height: m, approximate height of the tower.
     """
-    inside = (h >= lowest) & (h <= height)
+    inside = (h >= SCRUB_M) & (h <= height)
     s, t, h = s[inside], t[inside], h[inside]
     best: tuple[float, float, np.ndarray, float] | None = None
     for level in LEVELS_M:
@@ -110,11 +110,12 @@ def fit_profile(
     for _ in range(3):
         foot, top, free = _taper(s - at[0], t - at[1], h, height, level, max(1.6 * width, 0.8))
         move = _centre(s - at[0], t - at[1], h, height, level, foot, top, free)
-        at += np.clip(centre + width - at, None, np.clip(move, centre - width - at, None))
+        # A wide prism may reach to another body, which must not draw the axis away.
+        at = np.clip(at + move, centre - width, centre + width)
         if np.abs(move).max() < 0.02:
             break
     levels = np.arange(len(free)) * level
-    counted = free[levels >= lowest]
+    counted = free[levels >= SCRUB_M]
     share = float(counted.mean()) if len(counted) else 0.0
     return Profile(float(at[0]), float(at[1]), foot, top, height, share, level)
 

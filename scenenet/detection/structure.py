@@ -1,8 +1,8 @@
 """The structure of a tower: which points are its own.
 
-A tower is measured in the points around the axis that the voxels gave. The result is a
-shape and not a list of points: a tapered body, crossarms in a plane across the line, and the ground
-below. Any point of the survey can be asked whether it lies in the shape.
+A tower is measured in the points around the axis that the voxels gave. The result is a shape and
+not a list of points: a tapered body, crossarms in a plane across the line, and the ground below.
+Any point of the survey can be asked whether it lies in the shape.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 
 from scenenet.detection.conductors import Span, leaving_spans, thin_share
 from scenenet.detection.ground import Ground, fit_ground
-from scenenet.detection.head import AIR_M, ARM_M, NO_HEAD, Head, find_head
+from scenenet.detection.head import ARM_M, NO_HEAD, Head, find_head
+from scenenet.detection.portal import find_twin
 from scenenet.detection.profile import GAP_M, Profile, fit_profile
 
 MARGIN_M = 0.1
@@ -24,9 +25,6 @@ FOOT_M = 0.5
 
 SCRUB_TOP_M = 3.0
 """m above the ground, highest scrub around a foot."""
-
-SCRUB_M = 1.0
-"""m above the ground from which a body is measured."""
 
 MIN_THIN = 0.5
 """Smallest share of the points of a span that are on thin lines."""
@@ -50,19 +48,6 @@ PEAK_M = 1.5
 
 SPARSE = 0.8
 """Share of the height in voxels up to which conductors are looked for at least."""
-
-TWIN = 0.25
-"""Largest distance between the poles of a portal as a share of the height; the poles of two lines
-are further apart."""
-
-TWIN_WIDTH_M = 0.6
-"""m, largest half width of a pole of a portal."""
-
-TWIN_UPRIGHT, TWIN_FREE = 0.6, 0.4
-"""Smallest share of the levels at which the second pole has points, and stands free."""
-
-BEAM, BEAM_SEEN = 0.5, 0.75
-"""Share of the height above which there is a beam, and smallest share of its length with points."""
 
 UPRIGHT_M = 1.5
 """m, smallest height of the levels in which a body has to be unbroken."""
@@ -223,7 +208,7 @@ def _measure_body(
 ) -> Structure | None:
     """The body near an axis, without crossarms and conductors."""
     s, t, h = _frame(points, axis, along, fit_ground(points - [*axis, 0]))
-    profile = fit_profile(s, t, h, SCRUB_M, height)
+    profile = fit_profile(s, t, h, height)
     if profile is None:
         return None
     axis = axis + profile.s * along + profile.t * np.array([along[1], -along[0]])
@@ -241,59 +226,16 @@ def _measure_body(
 
 
 def _with_twin(body: Structure, points: np.ndarray) -> Structure:
-    """The body, or both bodies of a portal: two poles across the line with a beam between them."""
-    if body.profile.foot > TWIN_WIDTH_M:
+    """The body, or both bodies of a portal."""
+    axis = np.array([body.x, body.y])
+    s, t, h = _frame(points, axis, body.along, body.ground)
+    at = find_twin(s, t, h, body.profile, body.height)
+    if at is None:
         return body
-    s, t, h = _frame(points, np.array([body.x, body.y]), body.along, body.ground)
-    level = body.profile.level
-    n_levels = int(body.height / level)
-    near = (np.abs(s) <= TWIN_WIDTH_M / 2) & (h >= SCRUB_M) & (h < n_levels * level)
-    furthest = TWIN * body.height
-    step = 0.2
-    n = int(furthest / step)
-    column = np.rint(t[near] / step).astype(int)
-    inside = np.abs(column) <= n
-    seen = np.zeros((2 * n + 1, n_levels), bool)
-    seen[column[inside] + n, (h[near][inside] / level).astype(int)] = True
-    # A pole and the noise of its points take up two or three columns.
-    wide = seen.copy()
-    wide[1:] |= seen[:-1]
-    wide[:-1] |= seen[1:]
-    for column in np.argsort(-wide.sum(axis=1), kind="stable"):
-        at = (column - n) * step
-        if wide[column].mean() < TWIN_UPRIGHT:
-            break
-        if abs(at) < 2 * TWIN_WIDTH_M:
-            continue
-        twin = fit_profile(s, t - at, h, SCRUB_M, body.height)
-        if twin is None or max(abs(twin.s), abs(twin.t)) > TWIN_WIDTH_M / 2:
-            continue
-        at += twin.t
-        if twin.free >= TWIN_FREE and twin.foot <= TWIN_WIDTH_M and _beam(s, t, h, at, body):
-            return _portal(body, points, at)
-    return body
-
-
-def _beam(s: np.ndarray, t: np.ndarray, h: np.ndarray, at: float, body: Structure) -> bool:
-    """Whether something thin leads across from the axis to a pole at ``at`` m beside it."""
-    low, high = sorted((0.0, at))
-    between = (t > low + 0.5) & (t < high - 0.5) & (h >= BEAM * body.height)
-    between &= h <= body.height + PEAK_M
-    n = max(int((high - low - 1.0) / 0.5), 1)
-    place = np.minimum(((t - low - 0.5) / 0.5), n - 1).astype(int)
-    beam = between & (np.abs(s) <= ARM_M)
-    air = between & (np.abs(s) > 2 * ARM_M) & (np.abs(s) <= 2 * ARM_M + AIR_M)
-    return bool(
-        len(np.unique(place[beam])) >= BEAM_SEEN * n and beam.sum() / ARM_M > air.sum() / AIR_M
-    )
-
-
-def _portal(body: Structure, points: np.ndarray, at: float) -> Structure:
-    """The portal of a body and its twin ``at`` m to the right of it."""
-    across = np.array([body.along[1], -body.along[0]])
-    x, y = (np.array([body.x, body.y]) + at / 2 * across).tolist()
+    away = at / 2 * np.array([body.along[1], -body.along[0]])
+    x, y = (axis + away).tolist()
     ground = fit_ground(points - [x, y, 0])
-    top = body.height + body.ground.elevation + float(body.ground.slope @ (across * at / 2))
+    top = body.height + body.ground.elevation + float(body.ground.slope @ away)
     return replace(body, x=x, y=y, ground=ground, apart=abs(at) / 2, height=top - ground.elevation)
 
 

@@ -11,23 +11,27 @@ import numpy as np
 from scenenet.prediction.tiling import EDGE, TileSpool
 
 KEPT_TILES = 64
-"""Tiles kept in memory: successive look-ups mostly need the same ones."""
+"""Tiles of voxels kept in memory: successive look-ups mostly need the same ones."""
+
+KEPT_POINTS = 9
+"""Tiles of points kept in memory: those around a tower. A tile of a dense survey takes 30 MB."""
 
 
 class SurveySurroundings:
     """What is near a place; each tile is read when a look-up needs it."""
 
-    def __init__(self, spool: TileSpool, read: Callable[[int], np.ndarray]) -> None:
+    def __init__(self, spool: TileSpool, read: Callable[[int], np.ndarray], kept: int) -> None:
         """Start with no tile in memory.
 
         Args:
             read: gives the positions (n, 3) m in the tile with a code.
+            kept: largest number of tiles in memory.
         """
         self._edge = EDGE * spool.voxel_size
         self._above: dict[tuple[int, int], list[int]] = defaultdict(list)
         for code, (_, y, x) in spool.places():
             self._above[x, y].append(code)
-        self._positions = lru_cache(maxsize=KEPT_TILES)(read)
+        self._positions = lru_cache(maxsize=kept)(read)
 
     def __call__(self, place: np.ndarray, radius: float) -> np.ndarray:
         """(M, 3) m, the positions within a planar radius in m of a place (2,)."""
@@ -44,9 +48,9 @@ class SurveySurroundings:
 
 def occupied_voxels(spool: TileSpool) -> SurveySurroundings:
     """The centres of the occupied voxels."""
-    return SurveySurroundings(spool, lambda code: spool.centres(spool.tile(code).zyx()))
+    return SurveySurroundings(spool, lambda code: spool.centres(spool.tile(code).zyx()), KEPT_TILES)
 
 
 def survey_points(spool: TileSpool) -> SurveySurroundings:
     """The points."""
-    return SurveySurroundings(spool, spool.points)
+    return SurveySurroundings(spool, spool.points, KEPT_POINTS)

@@ -103,6 +103,8 @@ def find_head(
     beside = (np.abs(s) > free) & (np.abs(s) <= free + AIR_M)
     outside = _count(t, h, beside, left, low, wide, tall) / AIR_M
     arm = (inside > 0) & (inside > FREE * outside)
+    # A cell has few points; with its neighbours it shows whether a crown is there.
+    arm &= _with_neighbours(inside) > FREE * _with_neighbours(outside)
     middle = left + (np.arange(wide) + 0.5) * CELL_M
     body = np.abs(np.abs(middle) - apart) <= half + CELL_M
     return Head(_connected(arm, body), left, low, thick)
@@ -117,6 +119,13 @@ def _count(
     inside = (i >= 0) & (i < wide) & (k >= 0) & (k < tall)
     flat = i[inside] * tall + k[inside]
     return np.bincount(flat, minlength=wide * tall).reshape(wide, tall).astype(float)
+
+
+def _with_neighbours(count: np.ndarray) -> np.ndarray:
+    """Sums over each cell and the eight around it."""
+    from scipy.ndimage import convolve
+
+    return np.asarray(convolve(count, np.ones((3, 3)), mode="constant"))
 
 
 def _thickness(

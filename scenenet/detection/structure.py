@@ -23,8 +23,9 @@ MARGIN_M = 0.1
 FOOT_M = 0.5
 """m above the ground below which grass and scrub cannot be told from the foot of a tower."""
 
-SCRUB_TOP_M = 3.0
-"""m above the ground, highest scrub around a foot."""
+SCRUB_TOP_M, SCRUB_TOP = 3.0, 0.15
+"""Height of the highest scrub around a foot: m, and as a share of the height of the body. Below a
+tall tower it may grow higher, because there is more clearance."""
 
 MIN_THIN = 0.5
 """Smallest share of the points of a span that are on thin lines."""
@@ -217,7 +218,7 @@ def _measure_body(
     s, t, h = _frame(points, axis, along, ground)
     half = profile.half_width(h) + MARGIN_M
     inside = np.maximum(np.abs(s), np.abs(t)) <= half
-    foot = _foot(s, t, h, profile)
+    foot = _foot(s, t, h, profile, height)
     top, upright = _top(h[inside & (h >= foot)], height, profile.level, foot)
     if top is None:
         return None
@@ -269,11 +270,11 @@ def _with_head(
     return replace(shape, height=top)
 
 
-def _foot(s: np.ndarray, t: np.ndarray, h: np.ndarray, profile: Profile) -> float:
+def _foot(s: np.ndarray, t: np.ndarray, h: np.ndarray, profile: Profile, height: float) -> float:
     """m above the ground up to which vegetation is as dense around the body as in it."""
     half = profile.half_width(h) + MARGIN_M
     distance = np.maximum(np.abs(s), np.abs(t))
-    levels = np.arange(FOOT_M, SCRUB_TOP_M, FOOT_M)
+    levels = np.arange(FOOT_M, max(SCRUB_TOP_M, SCRUB_TOP * height), FOOT_M)
     foot = FOOT_M
     for level in levels:
         at = (h >= level) & (h < level + FOOT_M)

@@ -50,6 +50,10 @@ PEAK_M = 1.5
 SPARSE = 0.8
 """Share of the height in voxels up to which conductors are looked for at least."""
 
+POINTS_PER_M = 0.7
+"""Smallest number of points of a body per m of its height. Fewer show no body; the corner of a
+facade may have them."""
+
 UPRIGHT_M = 1.5
 """m, smallest height of the levels in which a body has to be unbroken."""
 
@@ -219,8 +223,9 @@ def _measure_body(
     half = profile.half_width(h) + MARGIN_M
     inside = np.maximum(np.abs(s), np.abs(t)) <= half
     foot = _foot(s, t, h, profile, height)
-    top, upright = _top(h[inside & (h >= foot)], height, profile.level, foot)
-    if top is None:
+    of_body = h[inside & (h >= foot)]
+    top, upright = _top(of_body, height, profile.level, foot)
+    if top is None or (of_body <= top).sum() < POINTS_PER_M * (top - foot):
         return None
     x, y = axis.tolist()
     return Structure(x, y, ground, top, foot, along, profile, upright, NO_HEAD, ())

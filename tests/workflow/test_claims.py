@@ -149,9 +149,14 @@ def test_the_page_prints_what_the_table_says(finished, recounted):
     opening = re.search(r'id="overview".*?</section>', html, re.DOTALL)
     assert opening
     words = " ".join(re.sub(r"<[^>]+>", "", opening[0]).split())
-    printed = re.search(
-        r"(\d+)% are labelled tower \(precision\); it finds (\d+)% of the labelled", words
+    labels = re.search(r"Against the labels, [^.]* they are (\d+)% and (\d+)%", words)
+    truth = re.search(
+        r"(\d+)% are tower in truth \(precision\); it finds (\d+)% of the true", words
     )
-    assert printed, words
-    for percent, score in zip(printed.groups(), ("precision", "recall"), strict=True):
-        assert float(percent) / 100 == pytest.approx(recounted[score], abs=AT_THE_BORDER + 0.005)
+    assert labels and truth, words
+    for of_labels, of_truth, score in zip(
+        labels.groups(), truth.groups(), ("precision", "recall"), strict=True
+    ):
+        close = {"abs": AT_THE_BORDER + 0.005}
+        assert float(of_labels) / 100 == pytest.approx(recounted[score], **close)
+        assert float(of_truth) / 100 == pytest.approx(float(row[f"truth_{score}"]), **close)

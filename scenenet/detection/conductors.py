@@ -61,7 +61,7 @@ LINE_M = 6.0
 LINE_THICK_M = 0.3
 """m, radius of a line: a conductor or a bundle with the noise of its points."""
 
-BESIDE_M = 0.5, 0.8
+RING_M = 0.5, 0.8
 """m, radii of the free ring around a line; a bundle is narrower and the next conductor further."""
 
 LINE_POINTS = 4
@@ -226,7 +226,7 @@ def _on_line(offset: np.ndarray, heading: np.ndarray) -> bool:
     direction = far / np.linalg.norm(far, axis=1)[:, None]
     square = np.einsum("ni,ni->n", offset, offset)[:, None] - (offset @ direction.T) ** 2
     on = (square <= LINE_THICK_M**2).sum(axis=0)
-    inner, outer = BESIDE_M
+    inner, outer = RING_M
     beside = ((square > inner**2) & (square <= outer**2)).sum(axis=0)
     best = int(np.argmax(on - beside))
     return bool(on[best] >= LINE_POINTS and beside[best] <= LINE_BESIDE * on[best])

@@ -22,14 +22,14 @@ LOOSE = 0.75
 """Share of the thresholds that a rough measurement in voxels has to reach."""
 
 WIDE = 1.8
-"""Share of the usual reach of crossarms that is tried where no tower is found with it: the head of
-a window tower is nearly as wide as half its height."""
+"""Reach of crossarms amid the conductors, as a multiple of ``crossarm``: the head of a window tower
+is nearly as wide as half its height."""
 
 CLEAR = 0.6
-"""Share of free levels from which a body at the rough axis is not doubted."""
+"""Share of free levels from which a body stands clear."""
 
 CLEAR_NEEDS = 0.5
-"""Share of ``min_conductor`` that such a body needs: vegetation never stands so free."""
+"""Share of ``min_conductor`` that a clear body needs: vegetation seldom stands so free."""
 
 MIN_AMID = 0.5
 """Smallest length of conductors, the sum of ``Span.followed``, amid which an axis is looked for."""
@@ -135,7 +135,7 @@ def _in_points(
         place = np.array([shape.x, shape.y])
         far = surroundings(place + offset[:2], FURTHEST_M + FAR) - offset
         base = shape.ground.elevation
-        spans = tuple(s for s in shape.spans if leads_on(s, place, base, far, voxel_size))
+        spans = tuple(s for s in shape.conductors if leads_on(s, place, base, far, voxel_size))
         if not replace(shape, spans=spans).carries(enough):
             continue
         if any(np.hypot(shape.x - other.x, shape.y - other.y) <= APART_M for other in found):

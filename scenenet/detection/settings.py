@@ -66,8 +66,8 @@ class DetectionSettings(Settings):
         0.5,
         ge=0,
         le=1,
-        description="smallest share of the body that nothing touches, for towers below tau: it "
-        "excludes trees under a line, whose crowns are wide",
+        description="in crops, smallest share of the body that nothing touches, for towers below "
+        "tau: it excludes trees under a line, whose crowns are wide",
     )
     body: float = Field(
         2.1,

@@ -83,7 +83,7 @@ class Structure:
         apart: m, half the distance between the two bodies of a portal, which stand to the left and
             right of the axis; 0 for one body.
         upright: share of the levels of the body that have a point.
-        spans: directions in which conductors leave.
+        spans: directions in which something like conductors leaves.
     """
 
     x: float
@@ -109,6 +109,11 @@ class Structure:
         ground = replace(self.ground, elevation=self.ground.elevation + z)
         return replace(self, x=self.x + x, y=self.y + y, ground=ground)
 
+    @property
+    def conductors(self) -> tuple[Span, ...]:
+        """The spans that are thin enough for conductors."""
+        return tuple(span for span in self.spans if span.thin >= MIN_THIN)
+
     def carries(self, length: float) -> bool:
         """Whether it carries conductors of this ``length``, the sum of ``Span.followed``.
 
@@ -117,7 +122,7 @@ class Structure:
         """
         if length == 0:
             return True
-        conductors = tuple(span for span in self.spans if span.thin >= MIN_THIN)
+        conductors = self.conductors
         if sum(span.followed for span in conductors) < length:
             return False
         if min(span.lowest for span in conductors) > self.height + OVER_M:
@@ -256,21 +261,21 @@ def _with_head(
     s, t, h = _frame(points, np.array([body.x, body.y]), body.along, body.ground)
     across = np.array([body.along[1], -body.along[0]])
     moved = float((origin - np.array([body.x, body.y])) @ across)
+    body = replace(body, spans=spans)
     line = tuple(
         span
-        for span in spans
-        if span.thin >= MIN_THIN
-        and abs(_unit(span.bearing) @ body.along) > np.cos(np.radians(45.0))
+        for span in body.conductors
+        if abs(_unit(span.bearing) @ body.along) > np.cos(np.radians(45.0))
     )
     if not line:
-        return replace(body, spans=spans)
+        return body
     sides = [side + moved for side in _sides(line, across)]
     lowest = min(span.lowest for span in line) - BELOW_ARM * body.height
     lowest = max(lowest, body.height / 2)
     highest = max(body.height, *(span.highest for span in line))
     reach = max(abs(side) for side in sides)
     head = find_head(s, t, h, body.profile, body.apart, lowest, highest, reach)
-    shape = replace(body, spans=spans, head=head, height=highest + PEAK_M)
+    shape = replace(body, head=head, height=highest + PEAK_M)
     top = max(body.height, float(h[shape._arm(s, t, h)].max(initial=0.0)))
     return replace(shape, height=top)
 

@@ -135,6 +135,7 @@ class TilePredictions:
             place = np.array([tower.x, tower.y])
             near = points(place, tower.structure.reach)
             own = near[tower.structure.contains(near)]
+            own = own[self._owner(own) == 0]  # points in two shapes belong to the earlier tower
             self._number(own, number)
             self._structures.append(tower.structure)
             distance = edge_distance(place, occupied(place, MAX_M * 1.5)[:, :2])
@@ -154,10 +155,9 @@ class TilePredictions:
             probability[rows] = prediction.probability[at]
             tower[rows] = prediction.tower[at]
             shares[rows] = prediction.shares[at]
-        # A voxel with a tower's points may have others.
-        for number in np.unique(tower[tower > 0]).tolist():
-            rows = np.flatnonzero(tower == number)
-            tower[rows[~self._structures[number - 1].contains(xyz[rows])]] = 0
+        # A voxel with a tower's points may have others, and those of a second tower.
+        rows = np.flatnonzero(tower)
+        tower[rows] = self._owner(xyz[rows])
         return PointPredictions(probability, tower, shares)
 
     def _detected(self, threshold: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -193,6 +193,15 @@ class TilePredictions:
                 geneo: float(share) for geneo, share in zip(self.geneos, shares, strict=True)
             },
         )
+
+    def _owner(self, xyz: np.ndarray) -> np.ndarray:
+        """(n,) uint32, id of the first tower whose shape has each of the points (n, 3) m, or 0."""
+        owner = np.zeros(len(xyz), np.uint32)
+        for number, structure in enumerate(self._structures, start=1):
+            away = np.hypot(xyz[:, 0] - structure.x, xyz[:, 1] - structure.y)
+            rows = np.flatnonzero((owner == 0) & (away <= structure.reach))
+            owner[rows[structure.contains(xyz[rows])]] = number
+        return owner
 
     def _number(self, points: np.ndarray, number: int) -> None:
         """Write the id of a tower into the voxels of its points (n, 3) m.

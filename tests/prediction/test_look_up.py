@@ -64,3 +64,19 @@ def test_no_points_have_no_predictions(opened):
     points = prediction.look_up(np.empty((0, 3)))
     assert len(points.probability) == len(points.tower_id) == 0
     assert points.shares.shape == (0, 3)
+
+
+def test_points_in_the_shapes_of_two_towers_belong_to_the_first(opened):
+    prediction, cloud = opened
+    own = prediction.look_up(cloud.xyz).tower_id > 0
+    structures = prediction.tiles._structures
+    beside = structures[0].moved(-0.25, 0.0, 0.0)
+    structures.insert(0, beside)
+    try:
+        numbers = prediction.look_up(cloud.xyz).tower_id[own]
+    finally:
+        structures.pop(0)
+    in_first = beside.contains(cloud.xyz[own])
+    assert 0 < in_first.sum() < own.sum()
+    # The others are in the same voxels, and in the second shape.
+    assert np.array_equal(numbers, np.where(in_first, 1, 2))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenenet.pointcloud.quality.relief import MIN_POINTS, cell_numbers
+
 CELL_M = 4.0
 """m, side of the cells that are covered by points or not."""
 
@@ -11,10 +13,7 @@ THIN = 12.0
 """Points per m2 below which towers are missed: of six real crops thinned to 7 to 14 points per m2,
 three towers were found, and five at twice that."""
 
-MIN_POINTS = 1000
 MAX_CELLS = 2_000_000
-FAR = 2**30
-"""Cells are numbered from -FAR to FAR along each axis, so that two numbers fit in 64 bits."""
 
 
 class Density:
@@ -27,8 +26,7 @@ class Density:
         """Look at points (n, 3) m."""
         if len(self._cells) > MAX_CELLS:
             return
-        x, y = np.clip(np.floor(xyz[:, :2].T / CELL_M), -FAR, FAR).astype(np.int64) + FAR
-        self._cells = np.union1d(self._cells, (x << 32) | y)
+        self._cells = np.union1d(self._cells, cell_numbers(xyz, CELL_M))
 
     def findings(self, n_points: int) -> list[tuple[str, str]]:
         """(kind, text) of a density that hides towers, in a survey of ``n_points``."""

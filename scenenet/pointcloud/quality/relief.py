@@ -18,6 +18,12 @@ FAR = 2**30
 """Cells are numbered from -FAR to FAR along each axis, so that two numbers fit in 64 bits."""
 
 
+def cell_numbers(xyz: np.ndarray, size: float) -> np.ndarray:
+    """(n,) int64, the number of the planar cell of ``size`` that each of points (n, 3) lies in."""
+    x, y = np.clip(np.floor(xyz[:, :2].T / size), -FAR, FAR).astype(np.int64) + FAR
+    return np.asarray((x << 32) | y)
+
+
 class Relief:
     """Lowest and highest point of each cell of a survey, from a sample of its points."""
 
@@ -29,8 +35,7 @@ class Relief:
         """Look at points (n, 3)."""
         if len(self._cells) > MAX_CELLS:
             return
-        x, y = np.clip(np.floor(xyz[:, :2].T / CELL), -FAR, FAR).astype(np.int64) + FAR
-        cells = np.concatenate([self._cells, (x << 32) | y])
+        cells = np.concatenate([self._cells, cell_numbers(xyz, CELL)])
         low, high = (np.concatenate([old, xyz[:, 2]]) for old in (self._low, self._high))
         order = np.argsort(cells, kind="stable")
         self._cells, first = np.unique(cells[order], return_index=True)

@@ -22,6 +22,7 @@ from scenenet.dataset.labelled_towers import TowerSettings
 from scenenet.dataset.split import SplitSettings
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
+from scenenet.experiments.components.settings import ComponentsSettings
 from scenenet.experiments.contenders import contenders
 from scenenet.experiments.cross_validation.settings import CrossValidationSettings
 from scenenet.experiments.label_noise.settings import LabelNoiseSettings
@@ -118,6 +119,7 @@ class Config(Settings):
         description="series of short trainings that differ in one setting; see config/studies.yaml",
     )
     cross_validation: CrossValidationSettings = CrossValidationSettings()
+    components: ComponentsSettings = ComponentsSettings()
     label_noise: LabelNoiseSettings = LabelNoiseSettings()
     detection: DetectionSettings = DetectionSettings()
     predict: Prediction = Prediction()

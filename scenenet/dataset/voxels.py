@@ -105,13 +105,22 @@ class VoxelGrid:
         low, high = _bounds(xyz)
         # Rounding must add no voxel to an extent of whole voxels: all borders would move.
         counts = np.maximum(1, np.ceil((high - low - BORDER_M) / voxel_size)).astype(int)
-        if np.prod(counts.astype(float)) > MAX_VOXELS:
-            extent = " x ".join(f"{side:.0f}" for side in high - low)
-            raise InputError(
-                f"a grid over {extent} m needs more than {MAX_VOXELS} voxels of {voxel_size:g} m",
-                remedy="Remove stray points, or use larger voxels",
-            )
+        _require_few(counts, voxel_size, high - low)
         origin = (low + high - counts * voxel_size) / 2 - BORDER_M
+        return cls(tuple(origin.tolist()), float(voxel_size), tuple(counts[::-1].tolist()))
+
+    @classmethod
+    def on_map(cls, xyz: np.ndarray, voxel_size: float) -> VoxelGrid:
+        """As many voxels of ``voxel_size`` (m) as points (N, 3) need, with borders at multiples of
+        it in map coordinates, as ``scenenet.prediction.tiling`` places them.
+
+        Raises:
+            InputError: there are no points, or they are too far apart.
+        """
+        low, high = (np.floor((side + BORDER_M) / voxel_size) for side in _bounds(xyz))
+        counts = (high - low + 1).astype(int)
+        _require_few(counts, voxel_size, counts * voxel_size)
+        origin = low * voxel_size - BORDER_M
         return cls(tuple(origin.tolist()), float(voxel_size), tuple(counts[::-1].tolist()))
 
     @property
@@ -206,6 +215,16 @@ def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSa
         true = np.zeros(len(index), bool)
         true[np.searchsorted(index, voxel[is_true])] = True
     return VoxelSample(sample_id, grid, index, count, tower, true)
+
+
+def _require_few(counts: np.ndarray, voxel_size: float, extent: np.ndarray) -> None:
+    """Refuse a grid of ``counts`` (3,) voxels over ``extent`` (3,) m that needs too much memory."""
+    if np.prod(counts.astype(float)) > MAX_VOXELS:
+        sides = " x ".join(f"{side:.0f}" for side in extent)
+        raise InputError(
+            f"a grid over {sides} m needs more than {MAX_VOXELS} voxels of {voxel_size:g} m",
+            remedy="Remove stray points, or use larger voxels",
+        )
 
 
 def _bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

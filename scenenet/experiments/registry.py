@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from scenenet.experiments.components.summary import summarise_components, who_does_the_work
 from scenenet.experiments.cross_validation.summary import ranking, summarise_folds
 from scenenet.experiments.label_noise.summary import claim, summarise_label_noise
 
@@ -54,6 +55,17 @@ EXPERIMENTS: Mapping[str, Experiment] = {
             contents="Every crop is a test crop once; models are trained and tuned on the others.",
             summarise=summarise_folds,
             finding=ranking,
+        ),
+        Experiment(
+            name="components",
+            switch="run",
+            title="Who does the work",
+            place="5.2.4",
+            section="models",
+            contents="Rules alone, random and published parameters, trivial answers and a method "
+            "without training beside every model, with and without rules, on points and voxels.",
+            summarise=summarise_components,
+            finding=who_does_the_work,
         ),
         Experiment(
             name="label_noise",

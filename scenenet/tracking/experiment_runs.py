@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from scenenet.experiments.components.summary import case_name as component_name
 from scenenet.experiments.cross_validation.summary import CASE, case_name, summarise_folds
 from scenenet.experiments.label_noise.settings import LABELS
 from scenenet.experiments.registry import EXPERIMENTS
@@ -23,7 +24,7 @@ from scenenet.tracking.run_log import NOTE_TAG, RunGroup, RunRecord
 if TYPE_CHECKING:
     from scenenet.figures import Picture
 
-NOT_METRICS = ("seed", "model", "voxels", "level", "fold", "crops")
+NOT_METRICS = ("seed", "model", "voxels", "rules", "level", "fold", "crops")
 
 
 @dataclass(frozen=True)
@@ -121,8 +122,35 @@ def fold_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
     return groups
 
 
+def component_groups(runs: pd.DataFrame, origin: Origin) -> list[RunGroup]:
+    """The runs of the experiment that takes the method apart: a parent for each source and answer,
+    a run for each seed and fold.
+
+    Args:
+        runs: of ``scenenet.experiments.components.run``.
+        origin: data, settings and code of the runs.
+    """
+    description = (
+        "`point_`: points; `voxel_`: voxels; `towers_`: towers. `truth_` is measured against the "
+        "truth, where it is known, the others against the labels."
+    )
+    return [
+        group_of(
+            "components",
+            origin,
+            component_name(str(model), str(rules)),
+            {"model": str(model), "rules": str(rules)},
+            rows,
+            description,
+            lambda row: f"seed-{row['seed']}/fold-{row['fold']}",
+        )
+        for (model, rules), rows in runs.groupby(["model", "rules"], sort=False)
+    ]
+
+
 EXPERIMENT_GROUPS: Mapping[str, Callable[[pd.DataFrame, Origin], list[RunGroup]]] = {
     "cross_validation": fold_groups,
+    "components": component_groups,
     "label_noise": label_noise_groups,
 }
 """The MLflow runs of each experiment of ``scenenet.experiments.registry``."""

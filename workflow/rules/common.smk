@@ -136,6 +136,7 @@ def champion_file(model):
 MODEL_SUFFIXES = {"scenenet": ".json", "cnn": ".safetensors"}
 # The name of a model has no dot, so this folder is never that of a model.
 BOOSTED_TREES = "boosted.trees"
+WITHOUT_TRAINING = "without.training"
 
 try:
     settings = load(with_defaults(config))
@@ -155,6 +156,12 @@ CROSS_VALIDATED = {
     **{model.name: model.model_dump(mode="json") for model in settings.crossed_models()},
     BOOSTED_TREES: None,
 }
+# Trivial answers, rules alone and random parameters come first; these are drawn for the model that predicts.
+COMPONENTS = {
+    WITHOUT_TRAINING: model_settings(settings.predict.model),
+    **{model.name: model.model_dump(mode="json") for model in settings.models},
+    BOOSTED_TREES: None,
+}
 
 # Wildcard -> its values. A rule that is for some of them only says so in its own constraints.
 VALUES = {
@@ -164,6 +171,7 @@ VALUES = {
     "study": [study.name for study in settings.studies],
     "experiment": EXPERIMENTS,
     "contender": [*CROSS_VALIDATED] if "cross_validation" in EXPERIMENTS else [],
+    "component": [*COMPONENTS] if "components" in EXPERIMENTS else [],
     "noise_seed": list(settings.label_noise.seeds) if "label_noise" in EXPERIMENTS else [],
     "rank": list(CROP_RANKS),
 }
@@ -183,6 +191,7 @@ wildcard_constraints:
     study=any_of(VALUES["study"]),
     experiment=any_of(VALUES["experiment"]),
     contender=any_of(VALUES["contender"]),
+    component=any_of(VALUES["component"]),
     rank=any_of(VALUES["rank"]),
     seed=r"\d+",
     noise_seed=r"\d+",

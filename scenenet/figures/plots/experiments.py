@@ -1,4 +1,4 @@
-"""Charts of the experiments: cross-validation, and label noise.
+"""Charts of the experiments.
 
 Every function writes one PNG and returns its alternative text.
 """
@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from scenenet.experiments.components.settings import WITHOUT
+from scenenet.experiments.components.summary import leading as leading_components
 from scenenet.experiments.cross_validation.summary import (
     CASE,
     case_name,
@@ -105,3 +107,39 @@ def cross_validation(runs: pd.DataFrame, out: str | Path) -> str:
         for row in summary.to_dict("records")
     )
     return f"Cross-validated scores of each model against {against} as points. {scores}."
+
+
+def components(summary: pd.DataFrame, out: str | Path) -> str:
+    """F0.5 of points of each source, with rules and without, against the truth where it is known.
+
+    Args:
+        summary: of ``scenenet.experiments.components.summary``.
+        out: PNG to write.
+    """
+    start = leading_components(summary)
+    column = f"{start}point_f05"
+    names = list(dict.fromkeys(summary["model"]))
+    figure, axes = new_figure(1, 1, width=7.2, height=0.4 * len(names) + 1.5)
+    axis = axes[0, 0]
+    for colour, (label, chosen) in enumerate(
+        {
+            "without rules": summary["rules"] == WITHOUT,
+            "with rules, or its own answer": summary["rules"] != WITHOUT,
+        }.items()
+    ):
+        rows = summary[chosen]
+        at = np.array([names.index(name) for name in rows["model"]]) - 0.1 + 0.2 * colour
+        to_worst = (rows[column] - rows[f"{column}_worst"]).fillna(0)
+        axis.errorbar(rows[column], at, xerr=[to_worst, 0 * to_worst], fmt="o", ms=6, capsize=3,
+                      color=COLOURS[colour], label=label)  # fmt: skip
+    axis.set_yticks(range(len(names)), names)
+    against = "the truth" if start else "the labels"
+    axis.set(xlabel=f"F0.5 of points against {against}: mean and worst seed", xlim=(-0.02, 1.02))
+    axis.invert_yaxis()
+    figure.legend(loc="outside lower center", ncols=2, frameon=False, fontsize=9)
+    save(figure, out)
+    scores = "; ".join(
+        f"{row['model']}, {row['rules']}: {score_text(row[column])}"
+        for row in summary.to_dict("records")
+    )
+    return f"F0.5 of the points of each source of answers against {against} as points. {scores}."

@@ -1,12 +1,13 @@
-"""The experiments in the report: cross-validation and label noise (thesis 5.2.4, 5.2.5)."""
+"""The experiments in the report (thesis 5.2.4, 5.2.5)."""
 
 from __future__ import annotations
 
+from scenenet.experiments.components.summary import COUNTED
 from scenenet.experiments.cross_validation.summary import case_name
 from scenenet.experiments.label_noise.settings import AGAINST, LABELS
 from scenenet.experiments.label_noise.summary import findings
 from scenenet.experiments.registry import EXPERIMENTS
-from scenenet.metrics.score_columns import SCORE_COLUMNS, score_text
+from scenenet.metrics.score_columns import DECISIVE, SCORE_COLUMNS, score_text
 from scenenet.report.blocks import Column, Facts, Notes, Section, Text, table
 from scenenet.report.context import ReportContext, against, against_each
 
@@ -59,6 +60,53 @@ def cross_validation(context: ReportContext) -> Section | None:
         [
             Text(text),
             Facts(facts),
+            *context.figures(experiment.name),
+            table(frame, columns, caption, f"tables/{experiment.name}.csv"),
+        ],
+    )
+
+
+def components(context: ReportContext) -> Section | None:
+    """Rules alone, models alone, and both."""
+    experiment = EXPERIMENTS["components"]
+    frame = context.table(experiment.name)
+    if frame is None:
+        return None
+    measured = against(frame, "point_f05")
+    scores = [
+        Column(f"{what}_{c.name}{end}", f"{c.short} of {what}s{worst}", "score2")
+        for what in COUNTED
+        for c in TOWER_SCORES
+        for end, worst in (("", ""), ("_worst", ", worst"))
+        if not end or c.name == DECISIVE
+    ]
+    numbers = [
+        Column("towers", "towers", "count"),
+        Column("towers_found", "found", "number"),
+        Column("towers_found_worst", "found, worst", "number"),
+        Column("towers_false", "false", "number"),
+        Column("towers_false_worst", "false, worst", "number"),
+    ]
+    columns = [
+        Column("model", "source"),
+        Column("rules", "rules"),
+        Column("n_seeds", "seeds", "count"),
+        *against_each([*scores, *numbers], measured),
+        Column("parameters", "parameters", "count"),
+    ]
+    crops, seeds = int(frame["crops"].max()), int(frame["n_seeds"].max())
+    caption = (
+        f"{crops} test crops; models and tau know the other crops alone. Mean over {seeds} seeds "
+        "where something is drawn, and the worst seed. “Without rules”: voxels at or above tau, "
+        "the points in them, and a tower for each group of voxels that touch. “With rules”: the "
+        "answer of scenenet predict for the crop. “Rules alone”: every occupied voxel is a "
+        "candidate. “Shape priors”: scenenet.baselines.shape_priors, without training."
+    )
+    return Section(
+        experiment.name,
+        experiment.title,
+        [
+            Text(experiment.finding(frame, context.results.models)),
             *context.figures(experiment.name),
             table(frame, columns, caption, f"tables/{experiment.name}.csv"),
         ],
@@ -118,5 +166,9 @@ def label_noise(context: ReportContext) -> Section | None:
     )
 
 
-EXPERIMENT_SECTIONS = {"cross_validation": cross_validation, "label_noise": label_noise}
+EXPERIMENT_SECTIONS = {
+    "cross_validation": cross_validation,
+    "components": components,
+    "label_noise": label_noise,
+}
 """The section of each experiment of ``scenenet.experiments.registry``."""

@@ -1,0 +1,1 @@
+"""Who does the work: rules alone, models alone, and both, beside trivial and other answers."""

@@ -1,0 +1,94 @@
+"""Answers for a crop, for any source of probabilities."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenenet.dataset.crops import Crop
+from scenenet.dataset.voxels import VoxelGrid, voxelise
+from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.answers import (
+    Answer,
+    LabelledCrop,
+    at_or_above_tau,
+    group_places,
+    with_rules,
+)
+from scenenet.models.model_file import write_model
+from scenenet.models.predictions import probabilities
+from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.settings import PredictSettings
+
+LONE_POLES = DetectionSettings(min_conductor=0)
+
+
+@pytest.fixture
+def crop(scene) -> LabelledCrop:
+    """Two poles 14 m apart, on the cube of a crop."""
+    cloud = scene([(8.3, 15.2), (22.4, 15.7)])
+    towers = np.array([[8.3, 15.2, 0, 14], [22.4, 15.7, 0, 14]])
+    towers[:, :3] += cloud.xyz.min(axis=0)
+    sample = voxelise(cloud, VoxelGrid.cube(cloud.xyz, 32), "crop")
+    return LabelledCrop(Crop("crop", *towers[0, :2], 30.0, towers), cloud, sample)
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.37])
+def test_the_answer_with_rules_is_that_of_predict(crop, shift, pole_finder, tmp_path):
+    model, card = pole_finder
+    cloud = replace(crop.cloud, xyz=crop.cloud.xyz + shift)
+    moved = LabelledCrop(crop.crop, cloud, crop.sample)
+    answer = with_rules(
+        moved, lambda s: probabilities(model, s, card.measurement), card.threshold(), 1.0,
+        LONE_POLES,
+    )  # fmt: skip
+    write_model(tmp_path / "model.json", model, card)
+    np.save(tmp_path / "crop.npy", np.column_stack([cloud.xyz, cloud.classification]))
+    files = tmp_path / "crop.npy", tmp_path / "model.json"
+    with predict_survey(*files, PredictSettings(), LONE_POLES) as prediction:
+        own = prediction.look_up(cloud.xyz).tower_id > 0
+        places = [(tower.x, tower.y, tower.base, tower.height) for tower in prediction.towers]
+    assert len(places) == 2 and own.sum() > 300
+    assert np.array_equal(answer.points, own)
+    assert answer.towers == pytest.approx(np.array(places), abs=1e-3)
+
+
+def test_rules_alone_find_poles_and_not_the_tree(crop):
+    def everywhere(sample):
+        return sample.spread(np.ones(len(sample.index), np.float32))
+
+    answer = with_rules(crop, everywhere, 0.5, 1.0, LONE_POLES)
+    apart = np.hypot(*(answer.towers[:, None, :2] - crop.crop.towers[None, :, :2]).T)
+    assert apart.shape == (2, 2) and (apart.min(axis=0) < 0.3).all()
+    assert (answer.points & crop.cloud.is_tower).sum() > 0.9 * answer.points.sum()
+
+
+def test_without_rules_voxels_give_their_points_and_groups_are_towers(crop):
+    def labels(sample):
+        return sample.spread(np.where(sample.tower, 0.6, 0.4).astype(np.float32))
+
+    answer = at_or_above_tau(crop, labels, 0.5)
+    _, labelled = crop.sample.spread(np.zeros(len(crop.sample.index), np.float32))
+    assert np.array_equal(answer.voxels, labelled)
+    assert (answer.points | ~crop.cloud.is_tower).all()  # every labelled point is in such a voxel
+    apart = np.hypot(*(answer.towers[:, None, :2] - crop.crop.towers[None, :, :2]).T)
+    assert apart.shape == (2, 2) and (apart.min(axis=0) < 0.5).all()
+    assert len(at_or_above_tau(crop, labels, 0.7).towers) == 0
+
+
+def test_voxels_that_touch_at_a_corner_are_one_group():
+    voxels = np.zeros((4, 4, 8), bool)
+    voxels[0, 0, 0] = voxels[1, 1, 1] = voxels[2, 2, 6] = True
+    grid = VoxelGrid((10.0, 20.0, 0.0), 2.0, voxels.shape)
+    places = group_places(voxels, grid)
+    assert places[:, :2].tolist() == [[12.0, 22.0], [23.0, 25.0]]
+    assert np.isnan(places[:, 2:]).all()
+
+
+def test_a_voxel_with_a_point_of_the_answer_is_tower(crop):
+    answer = Answer.of_points(crop, crop.cloud.is_tower)
+    _, labelled = crop.sample.spread(np.zeros(len(crop.sample.index), np.float32))
+    assert np.array_equal(answer.voxels, labelled)
+    assert answer.towers is None

@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 from fixtures.output_reference import Described, described
 
+from scenenet.experiments.components import run as components
+from scenenet.experiments.components.summary import summarise_components
 from scenenet.experiments.cross_validation.run import COLUMNS
 from scenenet.experiments.cross_validation.summary import summarise_folds
 
@@ -31,6 +33,17 @@ def test_the_table_of_a_cross_validation_is_described(page):
     kind = page["tables/cross_validation.csv"]
     assert kind.lacks(table.columns) == set()
     assert kind.invents(table.columns) == set()
+
+
+def test_runs_and_table_of_the_parts_of_the_method_are_described(page):
+    row = dict.fromkeys(components.COLUMNS, 1) | {"model": "a", "rules": "b", "crops": "c d"}
+    table = summarise_components(pd.DataFrame([row, row | {"seed": 2}]))
+    for heading, columns in (
+        ("components/SOURCE/runs.csv", components.COLUMNS),
+        ("tables/components.csv", table.columns),
+    ):
+        assert page[heading].lacks(columns) == set()
+        assert page[heading].invents(columns) == set()
 
 
 def test_a_missing_column_would_be_noticed(page):

@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 
 from scenenet.config.schema import Config
+from scenenet.experiments.components import run as components
+from scenenet.experiments.components.settings import ITS_OWN, NOTHING, RULES_ALONE, WITH, WITHOUT
 from scenenet.experiments.cross_validation import run as cross_validation
 from scenenet.experiments.label_noise.run import COLUMNS
 from scenenet.experiments.label_noise.settings import LABELS
@@ -24,6 +26,7 @@ from scenenet.results.tables import write_tables
 from scenenet.tracking.experiment_runs import (
     EXPERIMENT_GROUPS,
     Origin,
+    component_groups,
     fold_groups,
     label_noise_groups,
     origin_of,
@@ -180,3 +183,60 @@ def test_a_run_for_each_fold_and_the_main_numbers_on_the_parent():
     assert group.parent.metrics["pooled_precision"] == pytest.approx(5 / 6)
     assert group.children[1].params["crops"] == "c d"
     assert group.parent.tags["scenenet.code"] == group.children[0].tags["scenenet.code"] == "d"
+
+
+def component_runs(truth: bool) -> pd.DataFrame:
+    """A model that the rules hardly need, against the truth if it is known."""
+    rows = []
+    cases = [
+        (NOTHING, ITS_OWN, 0, 0), (RULES_ALONE, WITH, 0, 8), ("scenenet", WITHOUT, 0, 2),
+        ("scenenet", WITH, 0, 8), ("scenenet", WITHOUT, 1, 2), ("scenenet", WITH, 1, 7),
+    ]  # fmt: skip
+    for model, rules, seed, hits in cases:
+        row = dict.fromkeys(components.COLUMNS) | {"model": model, "rules": rules, "seed": seed}
+        row |= {"fold": 1, "crops": "a b", "alive": hits > 0, "parameters": 11}
+        for against in ("truth_", "")[0 if truth else 1 :]:
+            for what in ("point", "voxel"):
+                counts = {"tp": hits, "fp": 2, "fn": 10 - hits}
+                row |= {f"{against}{what}_{name}": n for name, n in counts.items()}
+                row[f"{against}{what}_f05"] = hits / 10
+            row |= {f"{against}towers": 2, f"{against}towers_found": hits // 4}
+            row |= {f"{against}towers_false": seed}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+@pytest.mark.parametrize("truth", [True, False])
+def test_who_does_the_work_in_table_figure_and_section(results, thesis, truth):
+    (results.folder / "components").mkdir()
+    component_runs(truth).to_csv(results.folder / "components" / "runs.csv", index=False)
+    apart = replace(results, experiments=("components",))
+    write_tables(apart, thesis, apart.folder / "tables", names=())
+    table = pd.read_csv(apart.folder / "tables" / "components.csv")
+    assert list(table["model"]) == [NOTHING, RULES_ALONE, "scenenet", "scenenet"]
+    (drawing,) = [d for d in plan(apart) if d.section == "components"]
+    (picture,) = draw_all([drawing], apart.folder / "figures")
+    assert picture.file.stat().st_size > 5000
+    against = "the truth" if truth else "the labels"
+    assert f"against {against}" in picture.alt and f"against {against}" in picture.caption
+    assert "rules alone, with rules: 0.80; scenenet, without rules: 0.38" in picture.alt
+    section = experiment_sections.components(ReportContext(apart, thesis))
+    assert [block.kind for block in section.blocks] == ["text", "figure", "table"]
+    text = section.blocks[0].text
+    assert f"F0.5 of points against {against}: rules alone 0.80; scenenet with rules" in text
+    assert "adds little to the rules" in text
+    labels = [column.label for column in section.blocks[-1].columns]
+    first = "F0.5 of points, worst (truth)" if truth else "F0.5 of points, worst"
+    assert first in labels
+
+
+def test_a_parent_for_each_source_and_answer():
+    groups = component_groups(component_runs(truth=True), Origin("tiny"))
+    names = [group.parent.name for group in groups]
+    assert names == [NOTHING, RULES_ALONE, "scenenet, without rules", "scenenet, with rules"]
+    assert [child.key for child in groups[3].children] == [
+        "components/tiny/scenenet, with rules/seed-0/fold-1",
+        "components/tiny/scenenet, with rules/seed-1/fold-1",
+    ]
+    assert groups[3].parent.metrics["truth_point_f05"] == pytest.approx(0.75)
+    assert groups[3].children[1].params["rules"] == WITH

@@ -34,10 +34,23 @@ SCORED = {
 TRAINED = {"train_scenenet": 2, "train_cnn": 2, **SCORED}
 STUDIED = {"study": 2, "study_figure": 2, "track_studies": 1}
 """There are two studies, of one model."""
-NOISE = {"label_noise": 2, "join_runs": 1, "experiment_figure": 1, "track_experiment": 1}
+
+
+def experiments(**jobs: int) -> dict[str, int]:
+    """The jobs of some experiments, each of which is joined, drawn and logged."""
+    n = len(jobs)
+    return {**jobs, "join_runs": n, "experiment_figure": n, "track_experiment": n}
+
+
+NOISE = experiments(label_noise=2)
 """Label noise with two seeds, each with a survey of its own."""
+APART = experiments(components=4)
+"""The method taken apart: two models, the boosted trees, and what is not trained."""
+BOTH = experiments(label_noise=2, components=4)
+NOT_TREES = experiments(label_noise=2, components=3)
+"""The training settings do not concern the boosted trees."""
 BASELINE = {"boosted_trees": 1}
-LEARNED = {**TRAINED, **STUDIED, **BASELINE}
+LEARNED = {**TRAINED, **STUDIED, **BASELINE, **APART}
 """Jobs after a change of the voxels."""
 FROM_CROPS = {**LEARNED, "voxelisation_time": 1}
 """Jobs after a change of the crops."""
@@ -115,13 +128,13 @@ def test_another_recipe_generates_one_synthetic_survey_again(project):
 
 def test_another_emphasis_of_the_loss_trains_again_and_prepares_nothing(project):
     project.configure({"training.loss.alpha": 2.0})
-    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOISE}
+    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOT_TREES}
 
 
 def test_swapping_the_values_of_two_settings_trains_again(project):
     """Snakemake compares the parameters as a set, which does not see the swap."""
     project.configure({"training.loss": {"alpha": 0.1, "epsilon": 5.0}})
-    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOISE}
+    assert project.planned() == {**SETTINGS, **TRAINED, **STUDIED, **NOT_TREES}
 
 
 def test_writing_out_a_default_changes_nothing(project):
@@ -132,31 +145,32 @@ def test_writing_out_a_default_changes_nothing(project):
 def test_a_setting_of_one_stage_runs_that_stage_and_what_follows(project):
     project.configure({"detection.eps": 7.0})
     after = {"evaluate": 4, "tables": 1, **SHOWN}
-    assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BASELINE}
+    assert project.planned() == {**SETTINGS, **after, **PREDICTED, **BASELINE, **APART}
 
 
 def test_another_resolution_keeps_the_existing_grids(project):
     project.configure({"voxels.resolution": 64})
-    assert project.planned() == {**SETTINGS, "voxels": 2, **LEARNED, **NOISE}
+    assert project.planned() == {**SETTINGS, "voxels": 2, **LEARNED, **BOTH}
     assert (project.results / "voxels/first/cube-32/manifest.json").exists()
 
 
 def test_predicting_with_another_model_trains_nothing(project):
     project.configure({"predict.model": "cnn"})
-    assert project.planned() == {**SETTINGS, **PREDICTED, **SHOWN}
+    drawn = experiments(components=1)  # the random parameters are those of the model that predicts
+    assert project.planned() == {**SETTINGS, **PREDICTED, **SHOWN, **drawn, "tables": 1}
 
 
 def test_one_more_seed_trains_only_that_seed(project):
     project.configure({"seeds": [0, 1, 2]})
     own = {"train_scenenet": 1, "train_cnn": 1, "tune_scenenet": 1, "tune_cnn": 1, "evaluate": 2}
-    assert project.planned() == {**SETTINGS, **TRAINED, **BASELINE, **own}
+    assert project.planned() == {**SETTINGS, **TRAINED, **BASELINE, **APART, **own}
 
 
 def test_one_seed_less_trains_nothing(project):
     project.configure({"seeds": [0]})
     picked = {"champion_scenenet": 1, "champion_cnn": 1, "certificate": 2, "inference_time": 2}
     gathered = {**picked, "tables": 1, **SHOWN}
-    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BASELINE}
+    assert project.planned() == {**SETTINGS, **gathered, **PREDICTED, **BASELINE, **APART}
 
 
 def test_one_more_model_leaves_the_others_alone(project):
@@ -166,7 +180,7 @@ def test_one_more_model_leaves_the_others_alone(project):
     own = {"train_scenenet": 2, "tune_scenenet": 2, "evaluate": 2, "champion_scenenet": 1}
     own |= {"certificate": 1, "inference_time": 1}
     gathered = {"tables": 1, "figures": 1, "track": 1, "register": 1, "report": 1}
-    assert project.planned() == {**SETTINGS, **own, **gathered}
+    assert project.planned() == {**SETTINGS, **own, **gathered, **experiments(components=1)}
 
 
 def test_another_study_runs_itself_and_what_shows_it(project):
@@ -175,7 +189,7 @@ def test_another_study_runs_itself_and_what_shows_it(project):
     project.configure({"studies": studies})
     own = {"study": 1, "study_figure": 1, "track_studies": 1}
     shown = {"tables": 1, "report": 1, "mlflow_store": 1, "track": 1, "register": 1}
-    assert project.planned() == {**SETTINGS, **own, **shown, "track_experiment": 1}
+    assert project.planned() == {**SETTINGS, **own, **shown, "track_experiment": 2}
 
 
 def test_another_share_of_wrong_labels_trains_on_these_alone(project):
@@ -190,12 +204,12 @@ def test_one_more_seed_of_wrong_labels_trains_only_that_seed(project):
 
 def test_cross_validation_is_one_job_per_model_and_reads_the_existing_grids(project):
     project.configure({"cross_validation": {"leave_out": 2}})
-    own = {"cross_validation": 3, "join_runs": 1, "experiment_figure": 1}
+    own = experiments(cross_validation=3, components=4)
     logged = {
         "mlflow_store": 1,
         "track": 1,
         "track_studies": 1,
-        "track_experiment": 2,
+        "track_experiment": 3,
         "register": 1,
     }
     assert project.planned() == {**SETTINGS, **own, **logged, "tables": 1, "report": 1}
@@ -224,7 +238,7 @@ def test_editing_a_docstring_or_a_comment_runs_nothing(project):
 def test_editing_the_training_loop_trains_again_and_prepares_nothing(project):
     with (project.folder / "scenenet/training/train.py").open("a") as stream:
         stream.write("NOTHING = 0\n")
-    assert project.planned() == {**TRAINED, **STUDIED, **NOISE}
+    assert project.planned() == {**TRAINED, **STUDIED, **BOTH}
 
 
 def test_a_new_kernel_trains_again(project):
@@ -232,7 +246,7 @@ def test_a_new_kernel_trains_again(project):
     kernels = project.folder / "scenenet/geneo/kernels"
     (kernels / "cone.py").write_text("# to come\nNOTHING = 0\n")
     maps = {"tower_map": 2, "survey_map": 2}
-    assert project.planned() == {**LEARNED, **NOISE, **maps}
+    assert project.planned() == {**LEARNED, **BOTH, **maps}
 
 
 def test_editing_the_report_writes_the_report_again(project):
@@ -331,7 +345,7 @@ def test_a_deleted_store_or_manifest_is_made_again(project, file):
 
 def test_a_deleted_cache_of_voxels_is_made_again(project):
     (project.results / "voxels/second/cube-32/voxels.zarr.zip").unlink()
-    assert project.planned() == {"voxels": 1, **TRAINED, **BASELINE}
+    assert project.planned() == {"voxels": 1, **TRAINED, **BASELINE, **APART}
 
 
 @pytest.mark.parametrize(

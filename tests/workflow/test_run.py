@@ -21,7 +21,7 @@ STAGES = {
     *("train", "tune", "champion", "evaluate", "predict"),
     *("certificate", "inference_time", "voxelisation_time"),
     *("study", "boosted_trees", "tables", "figures", "interactive_crop"),
-    *("label_noise", "join_runs"),
+    *("components", "label_noise", "join_runs"),
     *("track", "track_studies", "track_experiment", "register", "report"),
 }
 

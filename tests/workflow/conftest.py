@@ -14,6 +14,8 @@ import pytest
 import yaml
 from fixtures.project import PACKAGE, PARTS, Project, copy_parts
 
+TRAINING = ("train_scenenet", "train_cnn")
+
 
 @pytest.fixture(scope="session")
 def project_in(project_root: Path) -> Callable[[Path], Project]:
@@ -47,13 +49,16 @@ def finished(tmp_path_factory, project_root, recorded) -> Project:
         if not shown.exists():
             # It uses the package of the repository, which may be compiled already. The tests change
             # a copy. Nothing runs again because of the copy: digests are those of the content.
-            first = Project(folder, package=project_root)
+            first = Project(folder, package=project_root, forked=True)
             copy_parts(project_root, folder, PARTS)
             _configure(first, recorded)
-            text = first.run()
+            # As users run it up to the trained models, because trainings record their memory.
+            start = first.call("--until", *TRAINING)
+            assert start.returncode == 0, start.stdout
+            text = start.stdout + first.run()
             copy_parts(project_root, folder, [PACKAGE])
             shown.write_text(text, encoding="utf-8")
-    return Project(folder, package=folder, shown=shown.read_text(encoding="utf-8"))
+    return Project(folder, package=folder, shown=shown.read_text(encoding="utf-8"), forked=True)
 
 
 def _configure(project: Project, recorded: Path) -> None:
@@ -82,7 +87,7 @@ def copied(finished, tmp_path_factory) -> Callable[[], Project]:
     def copy() -> Project:
         folder = tmp_path_factory.mktemp("copied") / "project"
         subprocess.run(["cp", "-a", str(finished.folder), str(folder)], check=True)
-        return Project(folder, package=folder)
+        return Project(folder, package=folder, forked=True)
 
     return copy
 

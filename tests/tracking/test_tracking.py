@@ -37,6 +37,7 @@ from scenenet.tracking import (
     model_groups,
     store_id,
 )
+from scenenet.tracking.database import create_database, exclusive
 from scenenet.tracking.logged_model import example
 from scenenet.tracking.registry import register_champions
 from scenenet.tracking.study_runs import note_of, study_groups
@@ -47,8 +48,8 @@ def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """MLflow's tables without our experiments; creating them takes seconds, so they are copied."""
     folder = tmp_path_factory.mktemp("mlflow")
     settings = TrackingSettings(uri=f"sqlite:///{folder / 'mlflow.db'}")
-    command = [sys.executable, "-m", "mlflow", "db", "upgrade", settings.uri]
-    subprocess.run(command, check=True, capture_output=True)
+    with exclusive(settings.uri):
+        create_database(settings.uri)
     return folder / "mlflow.db"
 
 

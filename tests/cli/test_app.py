@@ -22,6 +22,7 @@ from fixtures.forked import SCENENET, command_line
 from scenenet.cli.app import COMMANDS, app
 from scenenet.cli.options import Codes
 from scenenet.pointcloud import SCHEMES
+from scenenet.synthetic import SyntheticSettings, make_survey
 
 LIMIT_S = 1800
 
@@ -34,10 +35,9 @@ def scenenet(*arguments: object, cwd: Path | None = None) -> subprocess.Complete
 
 @pytest.fixture(scope="module")
 def survey(tmp_path_factory) -> Path:
-    """A small synthetic corridor with its truth."""
+    """A small synthetic corridor with few points."""
     out = tmp_path_factory.mktemp("survey") / "corridor.laz"
-    made = scenenet("synth", out, "--towers", 4, "--seed", 5, "--truth", out.with_name("truth.laz"))
-    assert made.returncode == 0, made.stderr
+    make_survey(SyntheticSettings(towers=4, seed=5, density=20), out)
     return out
 
 
@@ -102,8 +102,11 @@ def test_options_of_the_gradient_are_refused_for_a_searched_model(tmp_path, opti
     assert option in done.stderr and "search" in done.stderr
 
 
-def test_a_synthetic_survey_has_as_many_points_as_its_truth(survey):
-    reports = json.loads(scenenet("check", survey, survey.with_name("truth.laz"), "--json").stdout)
+def test_a_synthetic_survey_has_as_many_points_as_its_truth(tmp_path):
+    survey, truth = tmp_path / "corridor.laz", tmp_path / "truth.laz"
+    made = scenenet("synth", survey, "--towers", 2, "--seed", 5, "--truth", truth)
+    assert made.returncode == 0, made.stderr
+    reports = json.loads(scenenet("check", survey, truth, "--json").stdout)
     assert reports[0]["n_points"] == reports[1]["n_points"] > 100_000
 
 
@@ -155,9 +158,10 @@ def test_towers_without_conductors_can_be_accepted(command, model, tmp_path):
     assert "--min-conductor" in refused.stderr
 
 
-def test_the_required_conductor_length_is_in_the_summary(survey, model, tmp_path):
+def test_the_required_conductor_length_is_in_the_summary(pole_survey, model, tmp_path):
+    out = tmp_path / "out"
     done = scenenet(
-        "predict", survey, "--model", model, "--out", tmp_path, "--min-conductor", 0, "--json"
+        "predict", pole_survey, "--model", model, "--out", out, "--min-conductor", 0, "--json"
     )
     assert done.returncode == 0, done.stderr
     [summary] = json.loads(done.stdout)

@@ -14,7 +14,8 @@ from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, read, write_las
 from scenenet.synthetic import SyntheticSettings, make_survey
 
-LONE = ("--codes", "edp", "--min-conductor", "0", "--json")
+LABELLED = ("--codes", "edp", "--json")
+LONE = (*LABELLED, "--min-conductor", "0")
 """Options for poles without conductors."""
 
 
@@ -31,7 +32,7 @@ class Line:
 def line(tmp_path_factory, pole_finder) -> Line:
     folder = tmp_path_factory.mktemp("line")
     made = Line(folder / "line.laz", folder / "line.truth.laz", folder / "by-hand.json")
-    make_survey(SyntheticSettings(towers=3, seed=5), made.survey, truth=made.truth)
+    make_survey(SyntheticSettings(towers=3, seed=5, density=20), made.survey, truth=made.truth)
     write_model(made.model, *pole_finder)
     return made
 
@@ -48,7 +49,7 @@ def scored(line) -> dict[str, dict]:
     for fit in ("cube", "metric"):
         with contextlib.redirect_stdout(io.StringIO()) as out, contextlib.suppress(SystemExit):
             main(["evaluate", str(line.survey), "--truth", str(line.truth), "--model",
-                  str(line.model), "--fit", fit, *LONE])  # fmt: skip
+                  str(line.model), "--fit", fit, *LABELLED])  # fmt: skip
         printed[fit] = json.loads(out.getvalue())
     return printed
 
@@ -66,8 +67,7 @@ def shares(predicted: np.ndarray, true: np.ndarray) -> dict[str, float | int]:
 
 
 def test_points_are_those_of_the_survey_that_predict_writes(line, scored, call, tmp_path):
-    done = call("predict", line.survey, "--model", line.model, "--out", tmp_path,
-                "--min-conductor", "0")  # fmt: skip
+    done = call("predict", line.survey, "--model", line.model, "--out", tmp_path)
     assert done.code == 0, done.err
     in_tower = np.asarray(laspy.read(tmp_path / "line.laz").tower_id) > 0
     labelled, true = read(line.survey, "edp").is_tower, read(line.truth, "edp").is_tower
@@ -93,7 +93,7 @@ def test_every_crop_has_its_points(line, scored):
 
 def test_voxels_and_towers_are_scored_against_the_truth_too(line, scored, call):
     """As if the truth were the labels, for the towers of the whole survey."""
-    done = call("evaluate", line.truth, "--model", line.model, "--fit", "metric", *LONE)
+    done = call("evaluate", line.truth, "--model", line.model, "--fit", "metric", *LABELLED)
     as_labels = json.loads(done.out)
     against = scored["metric"]["truth"]
     assert against["towers"] == as_labels["towers"]
@@ -109,20 +109,22 @@ def test_voxels_and_towers_are_scored_against_the_truth_too(line, scored, call):
 
 
 def test_without_truth_there_is_no_score_against_it(line, call):
-    done = call("evaluate", line.survey, "--model", line.model, *LONE)
+    done = call("evaluate", line.survey, "--model", line.model, *LABELLED)
     result = json.loads(done.out)
     assert result["truth"] is None and result["labels_against_truth"] is None
     assert set(result["points"]) == {"precision", "recall", "iou", "n_true", "n_predicted"}
 
 
 def test_the_text_leads_with_the_truth_and_names_both(line, call):
-    done = call("evaluate", line.survey, "--truth", line.truth, "--model", line.model, *LONE[:-1])
+    done = call(
+        "evaluate", line.survey, "--truth", line.truth, "--model", line.model, *LABELLED[:-1]
+    )
     lines = done.out.splitlines()
     assert lines[0] == "against the truth"
     labels = lines.index("against the labels")
     assert any(text.startswith("points: ") for text in lines[:labels])
     assert sum(text.startswith("the labels themselves: ") for text in lines[:labels]) == 1
-    without = call("evaluate", line.survey, "--model", line.model, *LONE[:-1])
+    without = call("evaluate", line.survey, "--model", line.model, *LABELLED[:-1])
     assert without.out.splitlines() == lines[labels + 1 :]
 
 

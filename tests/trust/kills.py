@@ -50,7 +50,7 @@ TIMES = re.compile(r"second|minute|_ms|_s$|time|speed|date$|memory|started|ended
 
 def _kill_predict(folder: Path, seed: int, numbers: Sequence[int]) -> Iterator[Attempt]:
     survey, model = folder / "line.laz", folder / "model.json"
-    write_survey(survey, poles=8)
+    write_survey(survey, poles=4)
     write_pole_model(model)
     reference = folder / "reference"
     seconds = _start_and_kill(predict(survey, model, reference), folder / "tmp", None)

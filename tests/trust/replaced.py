@@ -44,7 +44,7 @@ def _try(folder: Path, seed: int, numbers: Sequence[int]) -> Iterator[Attempt]:
 
 def _surveys(folder: Path) -> dict[str, Path]:
     folder.mkdir()
-    cloud = make_scene([(15.5 + 30 * i, 15.5) for i in range(8)], size=(240.0, 30.0))
+    cloud = make_scene([(15.5 + 30 * i, 15.5) for i in range(4)], size=(120.0, 30.0))
     half = slice(len(cloud) // 2)
     fewer = PointCloud(cloud.xyz[half], cloud.classification[half], cloud.scheme)
     clouds = {"original": cloud, "with fewer points": fewer}

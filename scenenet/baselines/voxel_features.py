@@ -15,10 +15,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from scipy import ndimage
 
+from scenenet.baselines.neighbourhoods import around, ball, disk, moments, runs, spread, union
 from scenenet.dataset.voxels import VoxelSample
 
 
@@ -158,7 +158,7 @@ class _Scene(NamedTuple):
         """
         highest = self.solid.shape[0] - self.solid[::-1].argmax(axis=0)
         tops = np.where(self.solid.any(axis=0), highest * self.voxel_size, -np.inf)
-        steps = _disk(TOP_M, self.voxel_size)
+        steps = disk(TOP_M, self.voxel_size)
         reach = int(np.abs(steps).max())
         window = np.zeros((2 * reach + 1,) * 2, bool)
         window[tuple((steps + reach).T)] = True
@@ -182,7 +182,7 @@ class _Scene(NamedTuple):
 
     def moments(self, radius: float) -> np.ndarray:
         """(M, 11): number, sums, second moments and points of the voxels within ``radius`` m."""
-        return _moments(self.points_in, self.zyx, _ball(radius, self.voxel_size))
+        return moments(self.points_in, self.zyx, ball(radius, self.voxel_size))
 
     def columns(self, ground: np.ndarray) -> dict[str, np.ndarray]:
         """Features of the columns around a voxel, above and below it."""
@@ -194,9 +194,9 @@ class _Scene(NamedTuple):
         floor = self.at(ground)
         values = {}
         for radius in (1.0, 2.0):
-            filled = _union(upright, yx, _disk(radius, h))
+            filled = union(upright, yx, disk(radius, h))
             highest = np.where(filled.any(axis=1), depth - filled[:, ::-1].argmax(axis=1), 0)
-            up, down = _runs(filled, int(RUN_GAP_M / h + 1e-9))
+            up, down = runs(filled, int(RUN_GAP_M / h + 1e-9))
             # A stray return belongs to no run.
             values[f"run_{radius:g}"] = np.maximum(up[of, z] + down[of, z] - 1, 0) * h
             values[f"top_{radius:g}"] = highest[of] * h - floor
@@ -219,7 +219,7 @@ class _Scene(NamedTuple):
         stature, tall = tops - ground, np.full(len(self.zyx), TALL_M)
 
         def look(raster: np.ndarray, level: np.ndarray, outer: float, inner: float = -1.0):
-            return _around(raster, self.zyx, level, _disk(outer, h, inner)).T
+            return around(raster, self.zyx, level, disk(outer, h, inner)).T
 
         tall_6, mean_top_6, _ = look(stature, tall, 6.0)
         return {
@@ -250,7 +250,7 @@ class _Scene(NamedTuple):
             exact = ndimage.distance_transform_edt(length == 0) * self.voxel_size
             distance = np.minimum(exact, FARTHEST_CONDUCTOR_M)
         places = np.unique(self.zyx[linear & self.kept][:, 1:], axis=0)
-        nearby = _spread(length, places, _disk(6.0, self.voxel_size))
+        nearby = spread(length, places, disk(6.0, self.voxel_size))
         return {"conductor_distance": self.at(distance), "conductor_6": self.at(nearby)}
 
 
@@ -259,34 +259,15 @@ def _odd(metres: float, voxel_size: float) -> int:
     return 2 * round(metres / voxel_size / 2) + 1
 
 
-def _disk(outer: float, voxel_size: float, inner: float = -1.0) -> np.ndarray:
-    """(K, 2) steps (y, x) to the columns more than ``inner`` and at most ``outer`` m away."""
-    reach = int(outer / voxel_size + 1e-9)
-    steps = np.arange(-reach, reach + 1)
-    y, x = np.meshgrid(steps, steps, indexing="ij")
-    distance = np.hypot(y, x) * voxel_size
-    inside = (distance <= outer + 1e-9) & (distance > inner)
-    return np.stack([y[inside], x[inside]], axis=1).astype(np.int32)
-
-
-def _ball(radius: float, voxel_size: float) -> np.ndarray:
-    """(K, 3) steps (z, y, x) to the voxels at most ``radius`` m away."""
-    reach = int(radius / voxel_size + 1e-9)
-    steps = np.arange(-reach, reach + 1)
-    z, y, x = np.meshgrid(steps, steps, steps, indexing="ij")
-    inside = np.sqrt(z * z + y * y + x * x) * voxel_size <= radius + 1e-9
-    return np.stack([z[inside], y[inside], x[inside]], axis=1).astype(np.int32)
-
-
-def _axes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Linearity, planarity and verticality, each (M,) in [0, 1], from ``_moments``; 0 if the voxels
+def _axes(sums: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Linearity, planarity and verticality, each (M,) in [0, 1], from ``moments``; 0 if the voxels
     have no extent."""
-    number = np.maximum(moments[:, 0], 1)[:, None]
-    mean = moments[:, 1:4] / number
-    covariance = np.empty((len(moments), 3, 3))
+    number = np.maximum(sums[:, 0], 1)[:, None]
+    mean = sums[:, 1:4] / number
+    covariance = np.empty((len(sums), 3, 3))
     for column, (i, j) in enumerate([(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)], start=4):
-        spread = moments[:, column] / number[:, 0] - mean[:, i] * mean[:, j]
-        covariance[:, i, j] = covariance[:, j, i] = spread
+        variance = sums[:, column] / number[:, 0] - mean[:, i] * mean[:, j]
+        covariance[:, i, j] = covariance[:, j, i] = variance
     lengths, axes = np.linalg.eigh(covariance)
     third, second, first = lengths.clip(min=0).T
     some = first > 1e-9
@@ -294,109 +275,3 @@ def _axes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     linearity = np.where(some, (first - second) / largest, 0)
     planarity = np.where(some, (second - third) / largest, 0)
     return linearity, planarity, np.where(some, np.abs(axes[:, 0, 2]), 0)
-
-
-@numba.njit(cache=True)
-def _moments(points, zyx, steps):  # pragma: no cover - compiled
-    """(M, 11): sums of 1, z, y, x, zz, yy, xx, zy, zx, yx and points over the voxels at ``steps``
-    from each voxel."""
-    depth, height, width = points.shape
-    out = np.zeros((len(zyx), 11))
-    for i in range(len(zyx)):
-        for j in range(len(steps)):
-            dz, dy, dx = steps[j, 0], steps[j, 1], steps[j, 2]
-            z, y, x = zyx[i, 0] + dz, zyx[i, 1] + dy, zyx[i, 2] + dx
-            if z < 0 or y < 0 or x < 0 or z >= depth or y >= height or x >= width:
-                continue
-            if points[z, y, x]:
-                out[i, 0] += 1
-                out[i, 1] += dz
-                out[i, 2] += dy
-                out[i, 3] += dx
-                out[i, 4] += dz * dz
-                out[i, 5] += dy * dy
-                out[i, 6] += dx * dx
-                out[i, 7] += dz * dy
-                out[i, 8] += dz * dx
-                out[i, 9] += dy * dx
-                out[i, 10] += points[z, y, x]
-    return out
-
-
-@numba.njit(cache=True)
-def _union(upright, yx, steps):  # pragma: no cover - compiled
-    """(C, D) uint8: heights at which any of the columns at ``steps`` from a column is occupied."""
-    height, width, depth = upright.shape
-    out = np.zeros((len(yx), depth), np.uint8)
-    for i in range(len(yx)):
-        for j in range(len(steps)):
-            y, x = yx[i, 0] + steps[j, 0], yx[i, 1] + steps[j, 1]
-            if 0 <= y < height and 0 <= x < width:
-                for z in range(depth):
-                    out[i, z] |= upright[y, x, z]
-    return out
-
-
-@numba.njit(cache=True)
-def _runs(filled, gap):  # pragma: no cover - compiled
-    """Length of the run at each height upwards and downwards, itself included, two (C, D) arrays.
-
-    A run may contain gaps of up to ``gap`` empty heights; the length is 0 at empty heights.
-    """
-    n, depth = filled.shape
-    up, down = np.zeros((n, depth), np.int32), np.zeros((n, depth), np.int32)
-    for i in range(n):
-        first, last = -1, -1
-        for z in range(depth):
-            if filled[i, z]:
-                if last < 0 or z - last > gap + 1:
-                    first = z
-                last = z
-                down[i, z] = z - first + 1
-        first, last = -1, -1
-        for z in range(depth - 1, -1, -1):
-            if filled[i, z]:
-                if last < 0 or last - z > gap + 1:
-                    first = z
-                last = z
-                up[i, z] = first - z + 1
-    return up, down
-
-
-@numba.njit(cache=True)
-def _around(raster, zyx, level, steps):  # pragma: no cover - compiled
-    """(M, 3): over the columns at ``steps``, the share that reaches ``level``, the mean and the
-    maximum.
-
-    Columns with NaN do not count; without any other, the mean and the maximum are ``level``.
-    """
-    height, width = raster.shape
-    out = np.zeros((len(zyx), 3))
-    for i in range(len(zyx)):
-        n, reach, total, highest = 0, 0, 0.0, -np.inf
-        for j in range(len(steps)):
-            y, x = zyx[i, 1] + steps[j, 0], zyx[i, 2] + steps[j, 1]
-            if y < 0 or x < 0 or y >= height or x >= width or np.isnan(raster[y, x]):
-                continue
-            n += 1
-            total += raster[y, x]
-            reach += raster[y, x] >= level[i]
-            highest = max(highest, raster[y, x])
-        if n:
-            out[i, 0], out[i, 1], out[i, 2] = reach / n, total / n, highest
-        else:
-            out[i, 1], out[i, 2] = level[i], level[i]
-    return out
-
-
-@numba.njit(cache=True)
-def _spread(raster, places, steps):  # pragma: no cover - compiled
-    """(H, W): at each column the sum of ``raster`` over the ``places`` (P, 2) within ``steps``."""
-    height, width = raster.shape
-    out = np.zeros((height, width))
-    for i in range(len(places)):
-        for j in range(len(steps)):
-            y, x = places[i, 0] + steps[j, 0], places[i, 1] + steps[j, 1]
-            if 0 <= y < height and 0 <= x < width:
-                out[y, x] += raster[places[i, 0], places[i, 1]]
-    return out

@@ -27,6 +27,50 @@ EXAMPLES = (
     "scenenet train crops/ --codes edp --kind cnn --out cnn.safetensors",
 )
 
+Out = Annotated[
+    Path, typer.Option("--out", help="Model file to write: .json, or .safetensors for a CNN.")
+]
+Kind = Annotated[Kinds, typer.Option(help="Architecture.")]
+Protocol = Annotated[
+    Protocols,
+    typer.Option(
+        help="operational: a SCENE-Net with kernels in metres, fitted by a search, or a CNN that "
+        "starts from Fisher's discriminant. thesis: kernels in voxels, trained by gradient from a "
+        "random start."
+    ),
+]
+Seeds = Annotated[
+    int, typer.Option(min=1, help="Number of models to train. The best one is written.")
+]
+Epochs = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        help="Passes over the crops. Not for an operational SCENE-Net, which is fitted by a "
+        f"search.  [default: {presets.EPOCHS}]",
+    ),
+]
+LearningRate = Annotated[
+    float | None,
+    typer.Option(
+        min=1e-6,
+        max=LARGEST_RATE,
+        help="Step size of RMSProp. Not for an operational SCENE-Net.  [default: "
+        f"{presets.LEARNING_RATES['operational']:g} for an operational CNN, "
+        f"{presets.LEARNING_RATES['thesis']:g} for protocol thesis]",
+    ),
+]
+Validation = Annotated[
+    float | None,
+    typer.Option(
+        min=0,
+        max=0.9,
+        help="Share of the crops kept to choose the threshold tau on.  [default: 0 for an "
+        "operational SCENE-Net, whose eleven parameters hardly overfit; "
+        f"{presets.VALIDATION_SHARE:g} for other models]",
+    ),
+]
+
 DEFAULT_KIND = Kinds("scenenet")
 DEFAULT_PROTOCOL = Protocols("operational")
 
@@ -34,50 +78,14 @@ DEFAULT_PROTOCOL = Protocols("operational")
 def command(
     labelled: Labelled,
     codes: LabelCodes,
-    out: Annotated[
-        Path, typer.Option("--out", help="Model file to write: .json, or .safetensors for a CNN.")
-    ],
-    kind: Annotated[Kinds, typer.Option(help="Architecture.")] = DEFAULT_KIND,
-    protocol: Annotated[
-        Protocols,
-        typer.Option(
-            help="operational: a SCENE-Net with kernels in metres, fitted by a search, or a CNN "
-            "that starts from Fisher's discriminant. thesis: kernels in voxels, trained by "
-            "gradient from a random start."
-        ),
-    ] = DEFAULT_PROTOCOL,
-    seeds: Annotated[
-        int, typer.Option(min=1, help="Number of models to train. The best one is written.")
-    ] = 5,
-    epochs: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            help="Passes over the crops. Not for an operational SCENE-Net, which is fitted by a "
-            f"search.  [default: {presets.EPOCHS}]",
-        ),
-    ] = None,
-    learning_rate: Annotated[
-        float | None,
-        typer.Option(
-            min=1e-6,
-            max=LARGEST_RATE,
-            help="Step size of RMSProp. Not for an operational SCENE-Net.  [default: "
-            f"{presets.LEARNING_RATES['operational']:g} for an operational CNN, "
-            f"{presets.LEARNING_RATES['thesis']:g} for protocol thesis]",
-        ),
-    ] = None,
+    out: Out,
+    kind: Kind = DEFAULT_KIND,
+    protocol: Protocol = DEFAULT_PROTOCOL,
+    seeds: Seeds = 5,
+    epochs: Epochs = None,
+    learning_rate: LearningRate = None,
     resolution: Resolution = 64,
-    validation: Annotated[
-        float | None,
-        typer.Option(
-            min=0,
-            max=0.9,
-            help="Share of the crops kept to choose the threshold tau on.  [default: 0 for an "
-            "operational SCENE-Net, whose eleven parameters hardly overfit; "
-            f"{presets.VALIDATION_SHARE:g} for other models]",
-        ),
-    ] = None,
+    validation: Validation = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:

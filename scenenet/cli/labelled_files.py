@@ -254,7 +254,7 @@ def evaluate_files(
 ) -> dict[str, Any]:
     """Scores of a model on labelled files, against their labels and against the truth.
 
-    Points are scored by the answer that ``scenenet predict`` gives for each file, whatever the
+    Points are scored by the prediction that ``scenenet predict`` makes for each file, whatever the
     grid.
 
     Args:

@@ -1,4 +1,4 @@
-"""Scores of the answer that ``scenenet predict`` gives for a labelled survey: points, towers."""
+"""Scores of what ``scenenet predict`` finds in a labelled survey: points, towers."""
 
 from __future__ import annotations
 

@@ -133,7 +133,7 @@ def point_dimensions(geneos: Iterable[str]) -> dict[str, tuple[type, str]]:
         PROBABILITY: (np.float32, "probability of a tower"),
         TOWER_ID: (np.uint32, "tower number, 0 none"),
     }
-    shares = {f"{SHARE_PREFIX}{geneo}": (np.float32, "share in the answer") for geneo in geneos}
+    shares = {f"{SHARE_PREFIX}{geneo}": (np.float32, "share of the response") for geneo in geneos}
     return dimensions | shares
 
 

@@ -181,7 +181,7 @@ def log_runs(
             "experiment": settings.experiment,
             "runs": runs,
         }
-        # MLflow goes on writing to a file that was removed; the runs would be lost without a word.
+        # MLflow writes to a removed file without an error, and the runs would be lost.
         check_same_store(settings.uri, written, record)
     files.write_json(record, written)
     return written

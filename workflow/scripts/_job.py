@@ -29,8 +29,8 @@ THREAD_VARIABLES = (
 
 
 NOT_RECORDED = ("store", "stores", "crop_stores", "towers_record")
-"""Inputs without a fingerprint in the record: the manifests of stores have a digest of them, and
-the record of the labelled towers stands beside their table, which has one."""
+"""Inputs without a fingerprint in the record: a manifest has the digest of its store, and the
+record of the labelled towers describes a table that is an input with a fingerprint."""
 
 
 RECIPE, UNREADABLE = "recipe:", "unreadable"

@@ -19,7 +19,7 @@ from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.synthetic import SyntheticSettings, make_survey
 
-DETECTION = DetectionSettings()
+LONE_POLES = DetectionSettings(min_conductor=0)
 
 
 @pytest.fixture(scope="module")
@@ -41,12 +41,12 @@ def folder(tmp_path_factory, pole_finder):
 
 def test_points_of_a_crop_are_those_of_its_classified_survey(folder, tmp_path, capsys):
     model = folder / "model.json"
-    found = count_crop_points(model, [folder / "crops.json"], {"line-0001"}, DETECTION)
+    found = count_crop_points(model, [folder / "crops.json"], {"line-0001"}, LONE_POLES)
     assert capsys.readouterr().err == "model: points of crops counted: done (1)\n"
     crop, cloud = next(read_crops(folder / "crops.json"))
     assert set(found) == {crop.id}
     write_las(tmp_path / "crop.laz", cloud)
-    with predict_survey(tmp_path / "crop.laz", model, PredictSettings(), DETECTION) as prediction:
+    with predict_survey(tmp_path / "crop.laz", model, PredictSettings(), LONE_POLES) as prediction:
         in_tower = prediction.look_up(cloud.xyz).tower_id > 0
     assert in_tower.sum() > 100
     counts = found[crop.id]
@@ -60,9 +60,9 @@ def test_points_of_a_crop_are_those_of_its_classified_survey(folder, tmp_path, c
 def test_the_test_part_is_scored_against_labels_and_truth(folder):
     model, manifests = folder / "model.json", [folder / "crops.json"]
     result = evaluate(
-        model, [folder / "voxels.json"], folder / "split.csv", DETECTION, crop_manifests=manifests
+        model, [folder / "voxels.json"], folder / "split.csv", LONE_POLES, crop_manifests=manifests
     )
-    counts = count_crop_points(model, manifests, {"line-0002", "line-0003"}, DETECTION)
+    counts = count_crop_points(model, manifests, {"line-0002", "line-0003"}, LONE_POLES)
     total = counts["line-0002"] + counts["line-0003"]
     assert result.points == PointScores.of(total.labels)
     assert result.truth.points == PointScores.of(total.truth)
@@ -78,7 +78,7 @@ def test_the_test_part_is_scored_against_labels_and_truth(folder):
 
 def test_without_the_points_of_the_crops_there_are_no_scores_of_points(folder):
     voxels = [folder / "voxels.json"]
-    result = evaluate(folder / "model.json", voxels, folder / "split.csv", DETECTION)
+    result = evaluate(folder / "model.json", voxels, folder / "split.csv", LONE_POLES)
     assert result.points is None and result.truth.points is None
     assert result.truth.voxel.n_samples == 2
     assert result.labels_against_truth is None

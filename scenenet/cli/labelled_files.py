@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -222,19 +222,17 @@ def train_files(
             model, card, kept or training, tuning, training if kept else ()
         )
         candidates.append((seed, tuned, card, result))
-    seed, tuned, card, result = max(
-        candidates, key=lambda entry: entry[3]["validation"]["f05"] or 0.0
-    )
+    seed, tuned, card, result = max(candidates, key=lambda entry: entry[3].validation.decisive)
     write_model(out, tuned, card)
     return {
         "model": str(out),
         "seed": seed,
-        "tau": result["tau"],
-        "kernel_size": result["kernel_size"],
+        "tau": result.tau,
+        "kernel_size": list(result.kernel_size),
         "tuned_on": "validation" if kept else "training",
-        "scores": result["validation"],
+        "scores": asdict(result.validation),
         "seeds": [
-            {"seed": s, "kernel_size": r["kernel_size"], **r["validation"]}
+            {"seed": s, "kernel_size": list(r.kernel_size), **asdict(r.validation)}
             for s, _, _, r in candidates
         ],
         "crops": {"training": len(training), "validation": len(kept)},

@@ -10,31 +10,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any
 
 from scenenet.metrics.tower_matching import TowerMatch
-from scenenet.metrics.voxel_scores import Confusion
-
-
-@dataclass(frozen=True)
-class VoxelScores:
-    """Voxel scores at tau over all crops.
-
-    Attributes:
-        precision, recall, f05, iou_tower: of the tower class.
-        miou: mean IoU over background and tower.
-        tau: the threshold.
-        n_samples: number of crops.
-    """
-
-    precision: float | None
-    recall: float | None
-    f05: float | None
-    iou_tower: float | None
-    miou: float | None
-    tau: float
-    n_samples: int
-
-    @classmethod
-    def of(cls, counts: Confusion, tau: float, n_samples: int) -> VoxelScores:
-        return cls(**counts.scores(), tau=tau, n_samples=n_samples)
+from scenenet.metrics.voxel_scores import Confusion, VoxelScores
 
 
 @dataclass(frozen=True)

@@ -26,11 +26,10 @@ from scenenet.evaluation.result import (
     SampleScores,
     Scores,
     TowerScores,
-    VoxelScores,
 )
 from scenenet.metrics.threshold_curve import ThresholdCurve, curve_columns
 from scenenet.metrics.tower_matching import TowerMatch
-from scenenet.metrics.voxel_scores import Confusion, confusion
+from scenenet.metrics.voxel_scores import Confusion, VoxelScores, confusion
 from scenenet.models.base import VoxelModel
 from scenenet.models.model_file import ModelCard, read_model
 from scenenet.models.predictions import probabilities

@@ -94,3 +94,32 @@ def confusion(
     fn = int(np.count_nonzero(tower)) - tp
     total = probability.size if n_voxels is None else n_voxels
     return Confusion(tp, fp, fn, total - tp - fp - fn)
+
+
+@dataclass(frozen=True)
+class VoxelScores:
+    """Voxel scores at tau over all crops; None where one is not defined.
+
+    Attributes:
+        precision, recall, f05, iou_tower: of the tower class.
+        miou: mean IoU over background and tower.
+        tau: the threshold.
+        n_samples: number of crops.
+    """
+
+    precision: float | None
+    recall: float | None
+    f05: float | None
+    iou_tower: float | None
+    miou: float | None
+    tau: float
+    n_samples: int
+
+    @property
+    def decisive(self) -> float:
+        """As ``Confusion.decisive``."""
+        return self.f05 or 0.0
+
+    @classmethod
+    def of(cls, counts: Confusion, tau: float, n_samples: int) -> VoxelScores:
+        return cls(**counts.scores(), tau=tau, n_samples=n_samples)

@@ -15,8 +15,10 @@ from scenenet.core.files import read_json
 from scenenet.detection.survey_tower import SurveyTower, read_towers
 from scenenet.evaluation.result import Evaluation
 from scenenet.interpretability.result import ModelCertificate
+from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.settings import BOOSTED_TREES
 from scenenet.prediction.summary import PredictionSummary
+from scenenet.training.tuning_result import Tuning
 
 if TYPE_CHECKING:
     from scenenet.experiments.studies.settings import StudySettings
@@ -47,7 +49,7 @@ class SeedResult:
     kind: str
     seed: int
     evaluation: Evaluation
-    tuning: Mapping[str, Any] | None = None
+    tuning: Tuning | None = None
     history: pd.DataFrame | None = None
     provenance: Mapping[str, Any] | None = None
     resources: Mapping[str, Any] | None = None
@@ -60,9 +62,14 @@ class SeedResult:
         return self.evaluation.alive
 
     @property
-    def validation(self) -> Mapping[str, Any]:
-        """Scores on the validation crops at tau; empty before tuning."""
-        return {} if self.tuning is None else self.tuning.get("validation", {})
+    def validation(self) -> VoxelScores | None:
+        """Scores on the validation crops at tau; None before tuning."""
+        return None if self.tuning is None else self.tuning.validation
+
+    @property
+    def decisive(self) -> float:
+        """F0.5 on the validation crops, to choose by; 0 before tuning."""
+        return 0.0 if self.validation is None else self.validation.decisive
 
     @property
     def epochs(self) -> int | None:
@@ -146,8 +153,8 @@ class Results:
 
     def champion(self, model: str) -> SeedResult | None:
         """The seed with the highest F0.5 on the validation crops, the first one in a tie."""
-        tuned = [r for r in self.of_model(model) if r.validation]
-        return max(tuned, key=lambda r: r.validation["f05"] or 0.0, default=None)
+        tuned = [result for result in self.of_model(model) if result.tuning is not None]
+        return max(tuned, key=lambda result: result.decisive, default=None)
 
     def seed(self, model: str, seed: int) -> SeedResult:
         """Read all results of one training.
@@ -165,7 +172,7 @@ class Results:
             kind=self.models[model],
             seed=seed,
             evaluation=evaluation,
-            tuning=read_result(tuning) if tuning.exists() else None,
+            tuning=read_typed(tuning, Tuning.from_json) if tuning.exists() else None,
             history=read_table(history) if history.exists() else None,
             provenance=read_result(provenance) if provenance.exists() else None,
             resources=read_result(resources) if resources.exists() else None,

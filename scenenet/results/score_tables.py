@@ -42,7 +42,7 @@ def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
             "seed": result.seed,
             "alive": result.alive,
             "tau": result.evaluation.voxel.tau,
-            "validation_f05": result.validation.get("f05"),
+            "validation_f05": None if result.validation is None else result.validation.f05,
             "epochs": result.epochs,
         }
         for against, scores in both:

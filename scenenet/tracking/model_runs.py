@@ -162,8 +162,8 @@ def _final_metrics(result: SeedResult) -> dict[str, float | None]:
     test, towers = result.evaluation.voxel, result.evaluation.towers
     metrics: dict[str, float | None] = {f"test_{n}": getattr(test, n) for n in DECISIVE_FIRST}
     metrics["test_average_precision"] = result.evaluation.average_precision
-    validation = result.validation
-    metrics |= {f"validation_{n}": validation[n] for n in DECISIVE_FIRST if n in validation}
+    if result.validation is not None:
+        metrics |= {f"validation_{n}": getattr(result.validation, n) for n in DECISIVE_FIRST}
     metrics |= {f"towers_{name}": getattr(towers, name) for name in MATCH_SCORES}
     truth, points = result.evaluation.truth, result.evaluation.points
     if truth is not None:

@@ -87,7 +87,7 @@ def _champions(experiment: str, results: Results) -> dict[str, SeedResult]:
         if (best := results.champion(model)) is not None
     }
     if champions:
-        best = max(champions.values(), key=lambda champion: champion.validation["f05"] or 0.0)
+        best = max(champions.values(), key=lambda champion: champion.decisive)
         champions[experiment] = best
     return champions
 
@@ -117,11 +117,13 @@ def _registered(client: MlflowClient, name: str, champion: SeedResult, run_id: s
 
 
 def _tags(champion: SeedResult) -> Mapping[str, str]:
+    validation = champion.validation
+    assert validation is not None  # a champion is tuned
     return {
         "model": champion.model,
         "seed": str(champion.seed),
-        "validation_f05": score_text(champion.validation["f05"], 4),
-        "tau": f"{champion.validation['tau']:.6g}",
+        "validation_f05": score_text(validation.f05, 4),
+        "tau": f"{validation.tau:.6g}",
     }
 
 

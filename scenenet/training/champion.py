@@ -5,21 +5,21 @@ from __future__ import annotations
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from scenenet.core.files import atomic, read_json
+from scenenet.training.tuning_result import Tuning
 
 
 def champion(
     models: Sequence[str | Path], tunings: Sequence[str | Path], out_model: str | Path
-) -> dict[str, Any]:
-    """Copy the model with the highest validation F0.5; the first of equals.
+) -> Path:
+    """Copy the model with the highest validation F0.5, the first of equals; returns its file.
 
     Args:
         models, tunings: outputs of ``tune``, in the same order.
     """
-    results = [read_json(path) for path in tunings]
-    best = max(range(len(results)), key=lambda i: results[i]["validation"]["f05"] or 0.0)
+    results = [Tuning.from_json(read_json(path)) for path in tunings]
+    best = max(range(len(results)), key=lambda i: results[i].validation.decisive)
     with atomic(out_model) as partial:
         shutil.copyfile(models[best], partial)
-    return {"chosen": Path(models[best]).name, "validation": results[best]["validation"]}
+    return Path(models[best])

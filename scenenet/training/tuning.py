@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from scenenet.core.files import write_json
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
 from scenenet.dataset.voxels import Measurement, VoxelSample
 from scenenet.metrics.threshold_curve import ThresholdCurve, curve_columns
+from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.base import VoxelModel
 from scenenet.models.model_file import ModelCard, read_model, write_model
 from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import TuningSettings
+from scenenet.training.tuning_result import TriedSize, Tuning
 
 
 def tune(
@@ -24,13 +25,9 @@ def tune(
     settings: TuningSettings,
     out_model: str | Path,
     out_json: str | Path,
-) -> dict[str, Any]:
-    """Choose tau and kernel size by F0.5 on the validation part and write the tuned model.
-
-    Returns:
-        tau, kernel_size, the validation scores there, the scores at every tau (``curve``) and the
-        best of every kernel size tried (``kernel_sizes``).
-    """
+) -> Tuning:
+    """Choose tau and kernel size by F0.5 on the validation part; write the tuned model and what was
+    found (``Tuning.to_json``)."""
     trained, card = read_model(model)
     samples = load(voxel_manifests, crops_in(split, "validation")).samples
     learnt: Sequence[VoxelSample] = ()
@@ -38,7 +35,7 @@ def tune(
         learnt = load(voxel_manifests, crops_in(split, "train")).samples
     tuned, card, result = choose(trained, card, samples, settings, learnt)
     write_model(out_model, tuned, card)
-    write_json(out_json, result)
+    write_json(out_json, result.to_json())
     return result
 
 
@@ -48,7 +45,7 @@ def choose(
     validation: Sequence[VoxelSample],
     settings: TuningSettings,
     learnt: Sequence[VoxelSample] = (),
-) -> tuple[VoxelModel, ModelCard, dict[str, Any]]:
+) -> tuple[VoxelModel, ModelCard, Tuning]:
     """The model at its best kernel size, its card with tau, and the result of ``tune``.
 
     Args:
@@ -61,21 +58,12 @@ def choose(
     tried = []
     for candidate in candidates:
         tau, curve = tuned_tau(candidate, validation, learnt, card.measurement)
-        counts = curve.at(tau)
-        tried.append((counts.decisive, tau, candidate, curve, counts))
+        tried.append((VoxelScores.of(curve.at(tau), tau, len(validation)), candidate, curve))
     # The size it was trained with comes first and wins a tie.
-    _, tau, tuned, curve, counts = max(tried, key=lambda entry: entry[0])
-    result = {
-        "model": card.name,
-        "tau": tau,
-        "kernel_size": list(tuned.kernel_size),
-        "validation": counts.scores() | {"tau": tau, "n_samples": len(validation)},
-        "curve": curve_columns(curve),
-        "kernel_sizes": [
-            {"kernel_size": list(c.kernel_size), "tau": t, **n.scores()} for _, t, c, _, n in tried
-        ],
-    }
-    return tuned, card.with_tau(tau), result
+    scores, tuned, curve = max(tried, key=lambda entry: entry[0].decisive)
+    sizes = tuple(TriedSize(candidate.kernel_size, found) for found, candidate, _ in tried)
+    result = Tuning(card.name, tuned.kernel_size, scores, curve_columns(curve), sizes)
+    return tuned, card.with_tau(result.tau), result
 
 
 def tuned_tau(

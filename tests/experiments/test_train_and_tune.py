@@ -56,7 +56,7 @@ def test_with_validation_crops_a_model_is_tuned_as_in_the_workflow(crops, settin
     )
     _, card, tuning = choose(model, card, crops[3:4], TuningSettings(), crops[:3])
     assert tuned_model.tau == card.threshold()
-    assert tuned_model.f05 == tuning["validation"]["f05"]
+    assert tuned_model.f05 == tuning.validation.f05
     assert tuned_model.parameters == model.n_parameters()
     probability, truth = tuned_model.predict(crops[4])
     assert tuned_model.score(crops[4:]) == confusion(probability, truth, tuned_model.tau)

@@ -263,6 +263,6 @@ def test_tau_is_chosen_on_the_training_crops_as_well(toys):
     sizes = TuningSettings(kernel_sizes=((9, 5, 5),))
     _, card, result = choose(model, card_for(model), toys[3:], sizes, toys[:3])
     everything = threshold_curve(model, toys, "presence")
-    assert len(result["kernel_sizes"]) == 1
+    assert len(result.kernel_sizes) == 1
     assert card.tau in everything.tau
-    assert result["validation"]["n_samples"] == 1
+    assert result.validation.n_samples == 1

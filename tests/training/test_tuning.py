@@ -9,7 +9,7 @@ import pytest
 from scenenet.core.files import read_json
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.metrics.threshold_curve import THRESHOLDS
-from scenenet.metrics.voxel_scores import confusion
+from scenenet.metrics.voxel_scores import VoxelScores, confusion
 from scenenet.models.cnn import CNN
 from scenenet.models.model_file import read_model, write_model
 from scenenet.models.predictions import probabilities
@@ -17,6 +17,7 @@ from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import TuningSettings
 from scenenet.training.champion import champion
 from scenenet.training.tuning import choose, tune
+from scenenet.training.tuning_result import Tuning
 
 
 @pytest.fixture(scope="module")
@@ -34,13 +35,13 @@ def f05_at(model, crops, tau: float) -> float:
 def test_tau_is_where_f05_is_highest_on_validation(pole_finder, crops):
     model, card = pole_finder
     _, tuned, result = choose(model, card, crops, TuningSettings())
-    assert tuned.tau == result["tau"]
-    assert result["validation"]["f05"] == pytest.approx(f05_at(model, crops, tuned.tau))
+    assert tuned.tau == result.tau
+    assert result.validation.f05 == pytest.approx(f05_at(model, crops, tuned.tau))
     for tau in THRESHOLDS[::40]:
-        assert f05_at(model, crops, tau) <= result["validation"]["f05"]
-    assert max(result["curve"]["f05"]) == result["validation"]["f05"]
-    assert result["curve"]["tau"] == THRESHOLDS.tolist()
-    assert result["validation"]["n_samples"] == 2
+        assert f05_at(model, crops, tau) <= result.validation.f05
+    assert max(result.curve["f05"]) == result.validation.f05
+    assert result.curve["tau"] == THRESHOLDS.tolist()
+    assert result.validation.n_samples == 2
 
 
 def test_the_better_kernel_size_is_chosen(pole_finder, crops):
@@ -49,10 +50,10 @@ def test_the_better_kernel_size_is_chosen(pole_finder, crops):
     settings = TuningSettings(kernel_sizes=((1, 3, 3), (9, 9, 9)))
     chosen, _, result = choose(flat, card, crops, settings)
     assert chosen.kernel_size == (9, 9, 9)
-    assert result["kernel_size"] == [9, 9, 9]
-    tried = {tuple(entry["kernel_size"]): entry["f05"] for entry in result["kernel_sizes"]}
+    assert result.kernel_size == (9, 9, 9)
+    tried = {entry.kernel_size: entry.scores.f05 for entry in result.kernel_sizes}
     assert list(tried) == [(1, 3, 3), (9, 9, 9)]
-    assert tried[9, 9, 9] == result["validation"]["f05"] > tried[1, 3, 3]
+    assert tried[9, 9, 9] == result.validation.f05 > tried[1, 3, 3]
     assert chosen.shape_parameters() == model.shape_parameters()
 
 
@@ -62,7 +63,7 @@ def test_the_size_it_was_trained_with_wins_a_tie(crops, pole_finder):
     settings = TuningSettings(kernel_sizes=((1, 1, 1), (3, 1, 1)))
     chosen, tuned, result = choose(blind, card, crops, settings)
     assert chosen.kernel_size == (1, 1, 1)
-    assert result["validation"]["f05"] == 0
+    assert result.validation.f05 == 0
     assert tuned.tau == THRESHOLDS[-1]
 
 
@@ -70,7 +71,7 @@ def test_a_cnn_has_no_other_size(crops, pole_finder):
     _, card = pole_finder
     settings = TuningSettings(kernel_sizes=((3, 3, 3),))
     _, _, result = choose(CNN(1, (5, 5, 5)), card, crops, settings)
-    assert [entry["kernel_size"] for entry in result["kernel_sizes"]] == [[5, 5, 5]]
+    assert [entry.kernel_size for entry in result.kernel_sizes] == [(5, 5, 5)]
 
 
 def test_tuning_only_uses_validation_crops(chain, pole_finder, tmp_path):
@@ -80,9 +81,14 @@ def test_tuning_only_uses_validation_crops(chain, pole_finder, tmp_path):
         tmp_path / "m.json", [chain.voxels], chain.split, TuningSettings(),
         tmp_path / "tuned.json", tmp_path / "tuning.json",
     )  # fmt: skip
-    assert result["validation"]["n_samples"] == 1
-    assert read_json(tmp_path / "tuning.json") == result
-    assert read_model(tmp_path / "tuned.json")[1].tau == result["tau"]
+    assert result.validation.n_samples == 1
+    written = read_json(tmp_path / "tuning.json")
+    assert Tuning.from_json(written) == result and written == result.to_json()
+    (tried,) = written["kernel_sizes"]
+    assert tried == {"kernel_size": written["kernel_size"]} | {
+        name: value for name, value in written["validation"].items() if name != "n_samples"
+    }
+    assert read_model(tmp_path / "tuned.json")[1].tau == result.tau
 
 
 def test_the_champion_is_the_best_on_validation(tmp_path, pole_finder):
@@ -92,7 +98,7 @@ def test_the_champion_is_the_best_on_validation(tmp_path, pole_finder):
         models.append(tmp_path / f"seed-{seed}.json")
         write_model(models[-1], model, card.model_copy(update={"provenance": {"seed": seed}}))
         tunings.append(tmp_path / f"tuning-{seed}.json")
-        tunings[-1].write_text(json.dumps({"validation": {"f05": f05}}))
-    result = champion(models, tunings, tmp_path / "champion.json")
-    assert result == {"chosen": "seed-1.json", "validation": {"f05": 0.6}}
+        scores = VoxelScores(f05, f05, f05, f05, f05, tau=0.5, n_samples=1)
+        tunings[-1].write_text(json.dumps(Tuning("m", (9, 9, 9), scores, {}, ()).to_json()))
+    assert champion(models, tunings, tmp_path / "champion.json") == models[1]
     assert (tmp_path / "champion.json").read_bytes() == models[1].read_bytes()

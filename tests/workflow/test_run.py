@@ -119,11 +119,13 @@ def test_every_training_is_a_run_in_mlflow(finished):
         studied |= logged
     noisy = read_json(finished.results / "mlflow/label_noise.json")["runs"]
     assert len(noisy) == 2 * 4 * (1 + 2)  # levels; two models, the boosted trees, the labels; seeds
+    measured = read_json(finished.results / "mlflow/components.json")["runs"]
+    assert len(measured) == 15 + 23  # groups; those without a seed have one run, the others two
     with sqlite3.connect(finished.folder / "mlflow.db") as store:
         (active,) = store.execute(
             "SELECT count(*) FROM runs WHERE lifecycle_stage = 'active'"
         ).fetchone()
-    assert active == len(runs) + len(studied) + len(noisy)
+    assert active == len(runs) + len(studied) + len(noisy) + len(measured)
 
 
 def test_rules_leave_a_benchmark_and_a_log(finished):

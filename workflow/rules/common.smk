@@ -129,6 +129,13 @@ def tuned_file(model, seed):
     return f"{R}/models/{model}/seed-{seed}{suffix_of(model)}"
 
 
+def trained_for_components(w):
+    """The models of the split, which the workflow has trained; folds are trained in the job."""
+    if settings.cross_validation.leave_out or w.component not in VALUES["model"]:
+        return []
+    return [tuned_file(w.component, seed) for seed in settings.seeds]
+
+
 def champion_file(model):
     return f"{R}/models/{model}{suffix_of(model)}"
 

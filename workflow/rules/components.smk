@@ -1,13 +1,6 @@
 """Who does the work: rules alone, models alone, and both (thesis 5.2.4)."""
 
 
-def trained_for_components(w):
-    """The models of the split, which the workflow has trained; folds are trained in the job."""
-    if settings.cross_validation.leave_out or w.component not in VALUES["model"]:
-        return []
-    return [tuned_file(w.component, seed) for seed in settings.seeds]
-
-
 rule components:
     input:
         models=trained_for_components,

@@ -44,6 +44,21 @@ class SyntheticSettings(Settings):
     height: tuple[Metres, Metres] = Field(
         (14.5, 20.0), description="least and greatest height of a tower above its foot, m"
     )
+    body_width: float | None = Field(
+        None,
+        gt=0,
+        le=20.0,
+        description="width of the body of every tower, the same from foot to head, m: side of a "
+        "lattice, diameter of a pole, distance between the poles of an H-frame; none: that of its "
+        "kind",
+    )
+    arm_reach: float | None = Field(
+        None,
+        gt=0,
+        le=30.0,
+        description="reach of the longest cross-arm from the axis of every tower, m; none: that of "
+        "its kind",
+    )
     span: float = Field(70.0, ge=30.0, le=800.0, description="mean distance between towers, m")
     span_spread: float = Field(
         8.0, ge=0.0, description="standard deviation of the distance between towers, m"
@@ -185,6 +200,11 @@ class SyntheticSettings(Settings):
         for name in ("kinds", "clutter_kinds"):
             if not sum(getattr(self, name).values()) > 0:
                 raise ValueError(f"{name}: at least one kind needs a weight above 0")
+        if self.body_width and self.arm_reach and 2 * self.arm_reach <= self.body_width:
+            raise ValueError(
+                f"arm_reach: cross-arms that reach {self.arm_reach:g} m do not leave a body "
+                f"{self.body_width:g} m wide"
+            )
         if self.roads + self.rails > 1:
             raise ValueError("roads and rails: their sum is above 1")
         shortest = SHORTEST_SHARE * (self.span - 2 * self.span_spread)

@@ -9,7 +9,7 @@ import numpy as np
 from scenenet.synthetic.scene.random_fields import stream
 from scenenet.synthetic.scene.strip import Strip
 from scenenet.synthetic.scene.terrain import Terrain
-from scenenet.synthetic.scene.towers import KINDS, Structure, place
+from scenenet.synthetic.scene.towers import KINDS, Size, Structure, place
 from scenenet.synthetic.settings import SHORTEST_SHARE, SyntheticSettings
 
 LINE, STRETCH, TOWER, FLIGHT, FOOT = 0, 1, 2, 3, 4
@@ -90,7 +90,8 @@ class Line:
         settings = self._settings
         height, base, azimuth = float(heights[k]), float(bases[k]), float(azimuths[k])
         x, y = map(float, nodes[k])
-        structure = KINDS[kinds[k]](height, settings.circuits, settings.earth_wires)
+        size = Size(settings.body_width, settings.arm_reach)
+        structure = KINDS[kinds[k]](height, settings.circuits, settings.earth_wires, size)
         attachments = place(structure.attachments, x, y, base, azimuth)
         return Support(x, y, base, height, str(kinds[k]), azimuth, structure, attachments)
 

@@ -1,8 +1,8 @@
 """Towers as members (bars, tubes, strings), and points on members.
 
 In the frame of a tower x is along the cross-arms, y along the line, z up; the origin is the centre
-of the foot. To add a kind of tower, write a function (height, circuits, earth_wires) -> Structure,
-add it to ``KINDS`` and its name to ``settings.Kind``.
+of the foot. To add a kind of tower, write a function (height, circuits, earth_wires, size) ->
+Structure, add it to ``KINDS`` and its name to ``settings.Kind``.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,27 @@ class Structure:
     members: np.ndarray
     attachments: np.ndarray
     half_base: float
+
+
+class Size(NamedTuple):
+    """Prescribed lengths of a tower, m; None leaves the length to its kind.
+
+    Attributes:
+        width: of the body, the same from foot to head: side of a lattice, diameter of a pole,
+            distance between the poles of an H-frame.
+        reach: of the longest cross-arm from the axis; the others keep their share of it.
+    """
+
+    width: float | None = None
+    reach: float | None = None
+
+    def reach_or(self, length: float) -> float:
+        """The reach, or that of a kind in which it is ``length``."""
+        return length if self.reach is None else self.reach
+
+
+OF_ITS_KIND = Size()
+"""A tower with the lengths of its kind."""
 
 
 class _Frame:
@@ -120,10 +142,12 @@ def _pole_head(
     return points + _earth(frame, height, earth_wires)
 
 
-def lattice(height: float, circuits: int, earth_wires: int) -> Structure:
+def lattice(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
     """A pylon on a square pyramid (thesis 5.1.2: base 4.15 m at 34.7 m) with truss cross-arms."""
     frame = _Frame()
     base, waist, shoulder = 0.06 * height, 0.024 * height, 0.016 * height
+    if size.width is not None:
+        base = waist = shoulder = size.width / 2
     peak = 0.94 * height
     panels = max(4, round(height / 3.5))
     # Panels become shorter upwards, like the width of the body.
@@ -140,56 +164,64 @@ def lattice(height: float, circuits: int, earth_wires: int) -> Structure:
     else:
         storeys = [(0.11, 0.66), (0.14, 0.77), (0.1, 0.88)]
         arms = [(side * reach, z) for side in (-1, 1) for reach, z in storeys]
+    longest = max(abs(reach) for reach, _ in arms)
+    scale = size.reach_or(longest * height) / longest
     tips = []
     for reach, share in arms:
         z = share * height
         half = float(np.interp(z, levels, halves))
-        _truss_arm(frame, reach * height, z, half, 0.035 * height)
-        tips.append((reach * height, 0.0, z))
+        _truss_arm(frame, reach * scale, z, half, 0.035 * height)
+        tips.append((reach * scale, 0.0, z))
     points = _hang(frame, tips, min(2.0, 0.045 * height))
     points += _earth(frame, height, earth_wires)
     return Structure(frame.array(), np.asarray(points), base)
 
 
-def lattice_pole(height: float, circuits: int, earth_wires: int) -> Structure:
+def lattice_pole(
+    height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND
+) -> Structure:
     """A slender braced column, 0.7 m wide at the foot, as used for medium-voltage lines."""
     frame = _Frame()
     levels = np.linspace(0, height, max(6, round(height / 1.3)) + 1)
-    halves = np.linspace(0.35, 0.17, len(levels))
+    foot, top = (0.35, 0.17) if size.width is None else (size.width / 2, size.width / 2)
+    halves = np.linspace(foot, top, len(levels))
     _lattice_body(
         frame, np.r_[-BELOW_GROUND_M, levels], np.r_[halves[0], halves], leg=0.035, brace=0.012
     )
-    points = _pole_head(frame, height, circuits, earth_wires, reach=1.02, drop=1.62)
-    return Structure(frame.array(), np.asarray(points), 0.35)
+    points = _pole_head(frame, height, circuits, earth_wires, size.reach_or(1.02), drop=1.62)
+    return Structure(frame.array(), np.asarray(points), foot)
 
 
-def tubular(height: float, circuits: int, earth_wires: int) -> Structure:
+def tubular(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
     """A tapered steel or concrete pole."""
     frame = _Frame()
-    frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), 0.013 * height, 0.12)
-    points = _pole_head(frame, height, circuits, earth_wires, reach=0.98, drop=1.62)
-    return Structure(frame.array(), np.asarray(points), 0.3)
+    foot, top = (0.013 * height, 0.12) if size.width is None else (size.width / 2, size.width / 2)
+    frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), foot, top)
+    points = _pole_head(frame, height, circuits, earth_wires, size.reach_or(0.98), drop=1.62)
+    return Structure(frame.array(), np.asarray(points), max(0.3, top))
 
 
-def wooden(height: float, circuits: int, earth_wires: int) -> Structure:
+def wooden(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
     """A wooden pole with a wooden cross-arm and its two struts."""
     frame = _Frame()
-    frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), 0.17, 0.11)
-    points = _pole_head(frame, height, circuits, earth_wires, reach=1.1, drop=1.55)
+    foot, top = (0.17, 0.11) if size.width is None else (size.width / 2, size.width / 2)
+    frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), foot, top)
+    reach = size.reach_or(1.1)
+    points = _pole_head(frame, height, circuits, earth_wires, reach, drop=1.55)
     arm = points[0][2] - 0.2
     for side in (-1, 1):
-        frame.bar((0, 0, arm - 0.9), (side * 0.9, 0, arm), 0.05)
-    return Structure(frame.array(), np.asarray(points), 0.2)
+        frame.bar((0, 0, arm - 0.9), (side * min(0.9, reach), 0, arm), 0.05)
+    return Structure(frame.array(), np.asarray(points), max(0.2, top))
 
 
-def h_frame(height: float, circuits: int, earth_wires: int) -> Structure:
+def h_frame(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
     """Two poles, a beam across them and an X between them; conductors at one level."""
     frame = _Frame()
-    half, beam = 0.1 * height, height - 0.8
+    half, beam = 0.1 * height if size.width is None else size.width / 2, height - 0.8
     for side in (-1, 1):
         frame.bar((side * half, 0, -BELOW_GROUND_M), (side * half, 0, height), 0.19, 0.12)
         frame.bar((side * half, 0, 0.55 * height), (-side * half, 0, 0.8 * height), 0.05)
-    reach = 2.0 * half
+    reach = size.reach_or(2.0 * half)
     frame.bar((-reach, 0, beam), (reach, 0, beam), 0.1)
     shares = (-1.0, 0.0, 1.0) if circuits == 1 else (-1.0, -0.65, -0.3, 0.3, 0.65, 1.0)
     points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.6)
@@ -197,7 +229,7 @@ def h_frame(height: float, circuits: int, earth_wires: int) -> Structure:
     return Structure(frame.array(), np.asarray(points), half)
 
 
-KINDS: Mapping[str, Callable[[float, int, int], Structure]] = MappingProxyType(
+KINDS: Mapping[str, Callable[[float, int, int, Size], Structure]] = MappingProxyType(
     {
         "lattice": lattice,
         "lattice_pole": lattice_pole,

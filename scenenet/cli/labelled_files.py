@@ -21,6 +21,10 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.result import Evaluation, PointScores, TowerScores
 from scenenet.evaluation.scoring import score
 from scenenet.evaluation.surveys import LabelledSurvey, SurveyScores, score_survey
+from scenenet.interpretability.determination import determination
+from scenenet.interpretability.parameter_sentences import parameters_of
+from scenenet.models.base import VoxelModel
+from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import read_model, write_model
 from scenenet.models.settings import ModelSettings, TuningSettings
 from scenenet.pointcloud import survey_in_metres
@@ -200,8 +204,9 @@ def train_files(
             training crops. The scores are then too high, and ``tuned_on`` is ``training``.
 
     Returns:
-        the scores of each seed, the chosen seed, the numbers of crops, the skipped files,
-        and what looks wrong about the files.
+        the scores of each seed, the chosen seed, the parameters of the chosen model and whether
+        the crops determine them, the numbers of crops, the skipped files, and what looks wrong
+        about the files.
 
     Raises:
         InputError: no file has a labelled tower.
@@ -235,10 +240,25 @@ def train_files(
             {"seed": s, "kernel_size": list(r.kernel_size), **asdict(r.validation)}
             for s, _, _, r in candidates
         ],
+        "numbers": _numbers(tuned, [candidate for _, candidate, _, _ in candidates]),
         "crops": {"training": len(training), "validation": len(kept)},
         "skipped": files.skipped,
         "warnings": files.warnings,
     }
+
+
+def _numbers(chosen: VoxelModel, models: Sequence[VoxelModel]) -> list[dict[str, Any]]:
+    """The parameters of the chosen model, with what the models of all seeds say about each; none
+    for models in voxels."""
+    said = determination([model for model in models if isinstance(model, GeneoModel)])
+    if not said or not isinstance(chosen, GeneoModel):
+        return []
+    values = chosen.shape_parameters()
+    return [
+        {"name": p.name, "value": values[p.name], "unit": p.unit, **said[p.name]._asdict()}
+        for p in parameters_of(chosen, chosen.voxel_size or 1.0)
+        if p.name in said
+    ]
 
 
 def evaluate_files(

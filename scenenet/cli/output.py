@@ -24,7 +24,22 @@ def training_lines(result: dict[str, Any]) -> list[str]:
         f"R {score_text(scores['recall'])} F0.5 {score_text(scores['f05'], 3)} "
         f"tower IoU {score_text(scores['iou_tower'], 3)}",
     ]
+    lines += _number_lines(result["numbers"])
     return lines + [f"skipped: {s['sample']}: {s['reason']}" for s in result["skipped"]]
+
+
+def _number_lines(numbers: list[dict[str, Any]]) -> list[str]:
+    """The parameters that the crops determine, and the names of the others."""
+    lines = []
+    for n in numbers:
+        if n["determined"]:
+            unit = "" if n["unit"] == "1" else f" {n['unit']}"
+            between = f"{n['low']:.3g} to {n['high']:.3g}"
+            lines.append(f"{n['name']} {n['value']:.3g}{unit} ({between}, by {n['source']})")
+    others = [n["name"] for n in numbers if not n["determined"]]
+    if others:
+        lines.append(f"not determined by these crops: {', '.join(others)}")
+    return lines
 
 
 def score_lines(result: dict[str, Any]) -> list[str]:

@@ -44,21 +44,27 @@ def convolve(occupancy: Occupancy, kernel: Tensor) -> Tensor:
     return _Convolution.apply(kernel, occupancy)
 
 
-def convolve_at_voxels(occupancy: Occupancy, kernels: Tensor) -> Tensor:
-    """The result of ``convolve`` at the occupied voxels only, without a volume; no gradient.
+def convolve_at_voxels(
+    occupancy: Occupancy, kernels: Tensor, at: np.ndarray | None = None
+) -> Tensor:
+    """The result of ``convolve`` at some voxels only, without a volume; no gradient.
 
     Args:
         kernels: (K, kz, ky, kx), float32 or float64.
+        at: (M,) the voxels, ascending, as ``Occupancy.flat`` numbers them; None for the occupied
+            ones.
 
     Returns:
-        (K, M), in the order of ``occupancy.index``.
+        (K, M), in the order of ``at``.
     """
     weights = np.ascontiguousarray(kernels.detach().numpy())
-    out = np.empty((len(weights), len(occupancy.index)), weights.dtype)
-    rows = occupancy.plane_rows(occupancy.flat())
+    flat = occupancy.flat() if at is None else at
+    index = occupancy.index if at is None else at % int(np.prod(occupancy.shape))
+    out = np.empty((len(weights), len(flat)), weights.dtype)
+    rows = occupancy.plane_rows(flat)
     for k, kernel in enumerate(weights):
         table = table_of(kernel)
-        _pick(occupancy.runs, table, kernel.shape[2], occupancy.index, rows, out[k])
+        _pick(occupancy.runs, table, kernel.shape[2], index, rows, out[k])
     return torch.from_numpy(out)
 
 

@@ -12,6 +12,7 @@ from scenenet.core.errors import InputError, in_file
 from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
 from scenenet.dataset.crops import Crop, crop_of, read_crops
+from scenenet.dataset.tower_shapes import TowerShape, measure_shape
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, VoxelSettings, voxelise
 from scenenet.dataset.zarr_store import StoreReader, create
 
@@ -32,7 +33,8 @@ def build(
 
     Returns:
         the manifest: ``samples`` has an entry for each crop with its grid, the numbers of occupied
-        and tower voxels, and the time that voxelisation took, s.
+        and tower voxels, the time that voxelisation took, s, and the shape of its tower
+        (``scenenet.dataset.tower_shapes``).
 
     Raises:
         InputError: the crops do not match their manifest, or a crop cannot have the grid.
@@ -55,6 +57,7 @@ def build(
             with in_file(place=f"crop {crop.id}"):
                 sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id)
             seconds = time.perf_counter() - begin
+            shape = measure_shape(crop, cloud)
             arrays = {"index": sample.index, "count": sample.count, "tower": sample.tower}
             if sample.true is not None:
                 arrays["true"] = sample.true
@@ -68,6 +71,7 @@ def build(
                     "occupied": len(sample.index),
                     "tower": int(sample.tower.sum()),
                     "seconds": seconds,
+                    "tower_shape": None if shape is None else shape.plain(),
                 }
             )
     return facts
@@ -104,7 +108,9 @@ def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Datase
             if ids is not None and entry["id"] not in ids:
                 continue
             grid = VoxelGrid(tuple(entry["origin"]), entry["voxel_size"], tuple(entry["shape"]))
-            samples.append(VoxelSample(entry["id"], grid, **reader.get(entry["id"])))
+            known = entry.get("tower_shape")
+            shape = None if known is None else TowerShape(**known)
+            samples.append(VoxelSample(entry["id"], grid, **reader.get(entry["id"]), shape=shape))
             crops.append(crop_of(entry))
     if ids is not None and (missing := ids - {sample.id for sample in samples}):
         raise InputError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import Field
@@ -11,6 +11,9 @@ from pydantic import Field
 from scenenet.core.errors import InputError
 from scenenet.core.settings import Settings
 from scenenet.pointcloud.cloud import PointCloud
+
+if TYPE_CHECKING:
+    from scenenet.dataset.tower_shapes import TowerShape
 
 Fit = Literal["cube", "metric"]
 
@@ -156,6 +159,8 @@ class VoxelSample:
         tower: (M,) bool, whether any of its points is labelled tower: what a model learns.
         true: (M,) bool, whether any of its points is tower in truth; None where the truth is not
             known.
+        shape: of the tower in the middle, as the points of the crop show it; None where they do
+            not.
     """
 
     id: str
@@ -164,6 +169,7 @@ class VoxelSample:
     count: np.ndarray
     tower: np.ndarray
     true: np.ndarray | None = None
+    shape: TowerShape | None = None
 
     def phi(self, measurement: Measurement) -> np.ndarray:
         """The measurement at the occupied voxels, (M,) float32 in [0, 1] (thesis 4.2.2, 5.3.2).

@@ -133,15 +133,21 @@ class Structure:
 
     def contains(self, xyz: np.ndarray) -> np.ndarray:
         """(N,) bool, which points (N, 3) m are the tower's own."""
-        s, t, h = _frame(xyz, np.array([self.x, self.y]), self.along, self.ground)
-        return self._body(s, t, h) | self._arm(s, t, h)
+        s, t, h = self.frame(xyz)
+        return self.in_body(s, t, h) | self.in_arm(s, t, h)
 
-    def _body(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+    def frame(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Points (N, 3) m as s along the line, t to its right, h above the ground, (N,) m each."""
+        return _frame(xyz, np.array([self.x, self.y]), self.along, self.ground)
+
+    def in_body(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """(N,) bool, which points in its frame are of the body."""
         half = self.profile.half_width(h) + MARGIN_M
         inside = np.maximum(np.abs(s), np.abs(np.abs(t) - self.apart)) <= half
         return inside & (h >= self.foot) & (h <= self.height + MARGIN_M)
 
-    def _arm(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+    def in_arm(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """(N,) bool, which points in its frame are of the crossarms."""
         return (np.abs(s) <= self.head.thick) & self.head.covers(t, h)
 
 
@@ -197,7 +203,7 @@ def measure_structure(
     spans = tuple(
         replace(span, thin=thin_share(points, span, SIZE_M))
         for span in leaving_spans(
-            _voxels(points, origin),
+            lattice_on(points, origin, SIZE_M),
             (first.x, first.y),
             first.ground.elevation,
             top,
@@ -276,7 +282,7 @@ def _with_head(
     reach = max(abs(side) for side in sides)
     head = find_head(s, t, h, body.profile, body.apart, lowest, highest, reach)
     shape = replace(body, head=head, height=highest + PEAK_M)
-    top = max(body.height, float(h[shape._arm(s, t, h)].max(initial=0.0)))
+    top = max(body.height, float(h[shape.in_arm(s, t, h)].max(initial=0.0)))
     return replace(shape, height=top)
 
 
@@ -365,8 +371,14 @@ def _top(h: np.ndarray, height: float, level: float, foot: float) -> tuple[float
     return top, len(seen) / n_levels
 
 
-def _voxels(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    """(M, 3) m, centres of the occupied voxels on a lattice with the axis at a centre."""
+def lattice_on(points: np.ndarray, axis: np.ndarray, size: float) -> np.ndarray:
+    """(M, 3) m, centres of the occupied voxels of ``size`` m on a lattice with the axis (2,) at a
+    centre, in ascending order of x, y, z."""
     origin = np.array([*axis, 0.0])
-    steps = np.unique(np.rint((points - origin) / SIZE_M).astype(np.int64), axis=0)
-    return steps * SIZE_M + origin
+    steps = np.rint((points - origin) / size).astype(np.int64)
+    low = steps.min(axis=0)
+    # One number for each voxel: sorting rows takes twenty times as long.
+    sides = steps.max(axis=0) - low + 1
+    flat = np.unique(np.ravel_multi_index((steps - low).T, sides))
+    steps = np.stack(np.unravel_index(flat, sides), axis=1) + low
+    return steps * size + origin

@@ -156,7 +156,6 @@ def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) ->
     import torch
 
     from scenenet.convolution.coarsening import coarsened
-    from scenenet.convolution.convolve import convolve_at_voxels
     from scenenet.dataset.batches import batch
     from scenenet.models.geneo_model import GeneoModel
 
@@ -168,8 +167,7 @@ def _shares(model: VoxelModel, voxels: VoxelSample, measurement: Measurement) ->
         batch([voxels], measurement)[0], round(model.observed_size(size) / size)
     )
     with torch.no_grad():
-        outputs = convolve_at_voxels(observed, model.weighted_kernels())
-        parts = outputs[:, model.argmax_rows(observed, outputs.sum(dim=0))].numpy()[:, block]
+        parts = model.responses(observed, model.weighted_kernels()).numpy()[:, block]
     whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
     percent = np.rint(100 * parts / whole).astype("<i1")
     return {name: _coded(row) for name, row in zip(model.names, percent, strict=True)}

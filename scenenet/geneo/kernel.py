@@ -31,6 +31,11 @@ class ShapeParameter:
             "handcrafted values"); None takes the middle of the range.
         sentence: describes its value in metres (thesis 5.2.2); None takes ``meaning`` and the
             value.
+        physical: its bounds in kernels with measured numbers, in ``metric_unit``: what towers can
+            have. None takes those of kernels in metres.
+        measured: the field of ``scenenet.dataset.tower_shapes.TowerShape`` that gives its value in
+            such kernels; None leaves it to the search.
+        fixed: its value in such kernels where neither points nor scores determine it.
     """
 
     name: str
@@ -41,6 +46,9 @@ class ShapeParameter:
     metric: tuple[float, float] | None = None
     by_hand: float | None = None
     sentence: Sentence | None = None
+    physical: tuple[float, float] | None = None
+    measured: str | None = None
+    fixed: float | None = None
 
     @property
     def handcrafted(self) -> float:
@@ -57,6 +65,11 @@ class ShapeParameter:
         """Positive bounds, in ``metric_unit``."""
         return self.metric or (max(self.low, 1e-3 * self.high), self.high)
 
+    @property
+    def physical_range(self) -> tuple[float, float]:
+        """Positive bounds in kernels with measured numbers, in ``metric_unit``."""
+        return self.physical or self.metric_range
+
 
 BODY_RADIUS = ShapeParameter(
     "r",
@@ -67,15 +80,30 @@ BODY_RADIUS = ShapeParameter(
     metric=(0.1, 1.5),
     by_hand=2.0,
     sentence=body_radius,
+    physical=(0.05, 4.0),
+    measured="half_width",
 )
 """Radius of a tower's body, which the cylinder and the arrow share. The handcrafted value is half
 the mean width of 4.15 m (thesis 5.1.2) in voxels of about a metre, the size in a crop at 64^3."""
 
 
-def shell_sigma(meaning: str, sentence: Sentence) -> ShapeParameter:
-    """The tolerance sigma of a shell, whose ranges all kernels share."""
+def shell_sigma(
+    meaning: str,
+    sentence: Sentence,
+    physical: tuple[float, float] | None = None,
+    measured: str | None = None,
+) -> ShapeParameter:
+    """The tolerance sigma of a shell, whose ranges in voxels and in metres all kernels share."""
     return ShapeParameter(
-        "sigma", 0.5, 3.0, "voxel^2", meaning, metric=(0.15, 2.25), sentence=sentence
+        "sigma",
+        0.5,
+        3.0,
+        "voxel^2",
+        meaning,
+        metric=(0.15, 2.25),
+        sentence=sentence,
+        physical=physical,
+        measured=measured,
     )
 
 
@@ -93,12 +121,15 @@ class Lattice:
         planar_squared: (1, ky, kx) squared distance from the vertical axis, ||pi_-3(x - c)||^2.
         inside: (1, ky, kx), 1 in the support of the kernel and 0 elsewhere; None if the support is
             the whole box.
+        voxel: m, edge of the voxels in which the points are, for kernels with measured numbers. 0
+            samples the formula of a kernel at the centres of the voxels.
     """
 
     size: tuple[int, int, int]
     z: Tensor
     planar_squared: Tensor
     inside: Tensor | None = None
+    voxel: float = 0.0
 
     @classmethod
     def of_size(
@@ -124,6 +155,7 @@ class Lattice:
         radius: float,
         voxel_size: float,
         dtype: torch.dtype = torch.float32,
+        voxel: float = 0.0,
     ) -> Lattice:
         """The lattice in metres, limited to ``radius`` around the vertical axis. A disc has no
         corners, which would change the response when the scene rotates.
@@ -131,11 +163,12 @@ class Lattice:
         Args:
             size: (kz, ky, kx), all odd.
             radius, voxel_size: m.
+            voxel: m, as in the attributes.
         """
         voxels = cls.of_size(size, dtype)
         planar = voxels.planar_squared * voxel_size**2
         inside = (planar <= (radius * (1 + 1e-6)) ** 2).to(dtype)
-        return cls(size, voxels.z * voxel_size, planar, inside)
+        return cls(size, voxels.z * voxel_size, planar, inside, voxel)
 
     @property
     def top(self) -> float:
@@ -191,6 +224,50 @@ def zero_sum(kernel: Tensor, inside: Tensor | None = None) -> Tensor:
         return kernel - kernel.mean(dim=(1, 2), keepdim=True)
     kernel = kernel * inside
     return kernel - inside * (kernel.sum(dim=(1, 2), keepdim=True) / inside.sum())
+
+
+def seen_shell(lattice: Lattice, radius: Tensor, sigma: Tensor) -> Tensor:
+    """The shell of ``gaussian_shell`` as it is seen in voxels; each slice sums to 1.
+
+    A voxel says that a point is somewhere in it. If a point at distance d is uniform in its voxel
+    of edge a, d^2 is larger by a^2 / 6 on average, and its variance by d^2 a^2 / 3 + a^4 / 90. A
+    body that is thinner than a voxel keeps its radius and tolerance, and the kernel is still as
+    wide as a voxel. Its response is the occupied share of the shell, which hardly depends on how
+    many voxels a shell has on a grid.
+
+    Args:
+        radius: m, () or (kz, 1, 1).
+        sigma: m^2, ().
+
+    Returns:
+        (kz or 1, ky, kx).
+    """
+    edge = lattice.voxel**2
+    spread = (sigma.square() + radius.square() * edge / 3 + edge**2 / 90).sqrt()
+    shell = gaussian_shell(lattice.planar_squared, radius.square() + edge / 6, spread)
+    return normalised(shell if lattice.inside is None else shell * lattice.inside)
+
+
+def per_support(kernel: Tensor, lattice: Lattice) -> Tensor:
+    """A kernel (kz, ky, kx) divided by the number of voxels of its support in a slice where numbers
+    are measured, so that it gives an occupied share on every grid; unchanged otherwise."""
+    if not lattice.voxel or lattice.inside is None:
+        return kernel
+    return kernel / lattice.inside.sum()
+
+
+def normalised(kernel: Tensor) -> Tensor:
+    """A kernel (kz, ky, kx) that is not negative, with each slice divided by its sum; empty slices
+    stay empty."""
+    total = kernel.sum(dim=(1, 2), keepdim=True)
+    return kernel / total.clamp(min=torch.finfo(kernel.dtype).tiny)
+
+
+def column(lattice: Lattice, radius: Tensor) -> Tensor:
+    """(1, ky, kx): 1 within ``radius`` m of the axis, and falling to 0 within a voxel beyond."""
+    edge = lattice.voxel
+    beyond = (lattice.planar_squared.sqrt() - radius).clamp(min=0)
+    return (1 - beyond / edge).clamp(min=0)
 
 
 def gaussian_shell(squared_distance: Tensor, squared_radius: Tensor, sigma: Tensor) -> Tensor:

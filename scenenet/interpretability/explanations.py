@@ -10,10 +10,14 @@ from scenenet.detection.survey_tower import SurveyTower
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard
 
 NEGLIGIBLE = 0.01
 """Absolute share of a GENEO below which the explanation does not state its side."""
+
+UNDETERMINED = "no meaning: the training crops do not determine it"
+"""What stands in place of the meaning of a number that could as well have another value."""
 
 
 @dataclass(frozen=True)
@@ -105,21 +109,27 @@ def _sentence(share: float) -> str:
 def meanings(model: VoxelModel, card: ModelCard) -> list[tuple[str, float, str, str]]:
     """Every number of a SCENE-Net as (name, value, unit, meaning); none for a CNN.
 
-    The unit of a length in voxels includes the length of a voxel in metres.
+    The unit of a length in voxels includes the length of a voxel in metres. A number of which the
+    training crops do not determine the value has ``UNDETERMINED`` as its meaning.
     """
     if not isinstance(model, GeneoModel):
         return []
     values = model.shape_parameters()
+    evidence = model.evidence if isinstance(model, MetricSceneNet) else {}
+
+    def row(label: str, shown: str, unit: str, meaning: str) -> tuple[str, float, str, str]:
+        known = label not in evidence or evidence[label].determined
+        return shown, values[label], unit, meaning if known else UNDETERMINED
+
     rows = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         for parameter in kernel_named(geneo).parameters:
-            value = values[f"{name}.{parameter.name}"]
+            label = f"{name}.{parameter.name}"
             unit = model.unit_of(parameter)
             if unit == "voxel":
-                unit = f"voxel = {value * card.voxel_size:.2f} m"
-            rows.append((f"{name} {parameter.name}", value, unit, parameter.meaning))
-    rows += [
-        (f"lambda {name}", values[f"lambda.{name}"], "1", f"weight of the {name} in the observer")
-        for name in model.names
-    ]
+                unit = f"voxel = {values[label] * card.voxel_size:.2f} m"
+            rows.append(row(label, f"{name} {parameter.name}", unit, parameter.meaning))
+    for name in model.names:
+        meaning = f"weight of the {name} in the observer"
+        rows.append(row(f"lambda.{name}", f"lambda {name}", "1", meaning))
     return rows

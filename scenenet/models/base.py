@@ -6,9 +6,9 @@ from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar, Self
 
-import numpy as np
 from torch import Tensor, nn
 
+from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.convolution.observer import observe
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
@@ -71,14 +71,11 @@ class VoxelModel(nn.Module):
         kz, ky, kx = self.kernel_size
         return kz // 2, ky // 2, kx // 2
 
-    def argmax_rows(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
-        """(M,) row of the occupied voxel whose response each occupied voxel takes; its own row
-        unless the model uses cross-sections.
-
-        Args:
-            observed: (M,) H at the occupied voxels.
-        """
-        return np.arange(len(observed))
+    def responses(self, occupancy: Occupancy, kernels: Tensor) -> Tensor:
+        """(K, M) responses of ``kernels`` (K, kz, ky, kx), whose sum is the observer's kernel, at
+        the voxel whose sum each occupied voxel takes: at itself unless the model uses
+        cross-sections."""
+        return convolve_at_voxels(occupancy, kernels)
 
     @abstractmethod
     def observer(self) -> tuple[Tensor, Tensor | None]:

@@ -13,15 +13,23 @@ from torch import Tensor
 
 from scenenet.convolution.coarsening import block_edge
 from scenenet.convolution.convolve import convolve_at_voxels
-from scenenet.convolution.cross_section import neighbours, section_offsets, strongest, whole_voxels
+from scenenet.convolution.cross_section import (
+    Section,
+    section_of,
+    section_offsets,
+    strongest,
+    whole_voxels,
+)
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
-from scenenet.geneo import Lattice, ShapeParameter
+from scenenet.geneo import Lattice, ShapeParameter, kernel_named
 from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
+from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.settings import (
     LARGEST_KERNEL,
+    LARGEST_LENGTH,
     THESIS_GENEOS,
     KernelSize,
     MetricSettings,
@@ -31,6 +39,10 @@ COLUMN_M = 2.0
 """Occupied length of a tower's axis, m, at which the observer H is 1. It only sets the scale of H:
 the twelve metres that the kernels reach then give at most 6, where float32 still resolves
 probabilities."""
+BEYOND_REACH_M = 1.0
+"""m that a kernel reaches beyond the crossarms: a voxel of air."""
+CORNER_M = 0.5
+"""m that a cross-section reaches beyond the corners of a body: half a voxel."""
 TINY = 1e-9
 """Smallest mixing weight that is stored; smaller ones are replaced by it."""
 LOGIT_END = 16.0
@@ -44,12 +56,17 @@ class MetricSceneNet(GeneoModel):
       column that is occupied over a given height has the same H on every grid.
     - Parameters are stored as logits between their bounds and mixing weights as softmax logits, so
       every parameter is positive and every mixture convex.
+    - With ``metric.numbers`` ``measured``, the body and the crossarms have the lengths of the
+      labelled towers, kernels reach ``metric.radius`` beyond them, and each kernel accounts for the
+      extent of the voxels (``scenenet.geneo.kernel.seen_shell``).
     - An empty voxel has probability 0. An occupied voxel takes the strongest response in its
       cross-section (``scenenet.convolution.cross_section``).
 
     Attributes:
         metric: the lengths, m.
         voxel_size: m, edge of the voxels that the kernels are sampled at.
+        evidence: what the training data say about each number, by name; empty before training and
+            for files of earlier versions.
     """
 
     units = "m"
@@ -75,6 +92,11 @@ class MetricSceneNet(GeneoModel):
         """
         super().__init__(geneos, generator)
         self.metric = metric or MetricSettings()
+        self.evidence: dict[str, Evidence] = {}
+        for label, value in self.fixed_numbers().items():
+            name, symbol = label.rsplit(".", 1)
+            parameter = next(p for p in self.parameters_of(name) if p.name == symbol)
+            self._store(name, parameter, value)
         self._discretise(1.0)
 
     def _initial_shape(self, parameter: ShapeParameter, drawn: Tensor) -> Tensor:
@@ -95,9 +117,62 @@ class MetricSceneNet(GeneoModel):
         other._discretise(voxel_size)
         return other
 
+    @property
+    def measured(self) -> bool:
+        """Whether radius and reach are measured (``MetricSettings.numbers``)."""
+        return self.metric.numbers == "measured"
+
+    def bounds_of(self, parameter: ShapeParameter) -> tuple[float, float]:
+        """The bounds of a shape parameter, positive, in its metric unit."""
+        return parameter.physical_range if self.measured else parameter.metric_range
+
+    def measured_numbers(self) -> dict[str, str]:
+        """The numbers that are measured in points, and the field of
+        ``scenenet.dataset.tower_shapes.TowerShape`` of each."""
+        found = {}
+        for name in self.names if self.measured else ():
+            for parameter in self.parameters_of(name):
+                if parameter.measured is not None:
+                    found[f"{name}.{parameter.name}"] = parameter.measured
+        return found
+
+    def fixed_numbers(self) -> dict[str, float]:
+        """The numbers that are neither measured nor searched, with their values."""
+        found = {}
+        for name in self.names if self.measured else ():
+            for parameter in self.parameters_of(name):
+                if parameter.fixed is not None:
+                    found[f"{name}.{parameter.name}"] = parameter.fixed
+        return found
+
+    def body_radius(self) -> float:
+        """m, radius of the body that kernels and cross-sections follow; 0 where they do not."""
+        radii = [
+            float(self.shape_of(name)[parameter.name].detach())
+            for name in (self.names if self.measured else ())
+            for parameter in self.parameters_of(name)
+            if parameter.measured == "half_width"
+        ]
+        return max(radii, default=0.0)
+
+    def support_of(self, name: str) -> float:
+        """m, horizontal reach of the GENEO called ``name``."""
+        support = self.metric.radius + self.body_radius()
+        for parameter in self.parameters_of(name) if self.measured else ():
+            if parameter.measured == "reach":
+                reach = float(self.shape_of(name)[parameter.name].detach())
+                support = max(support, reach + BEYOND_REACH_M)
+        return min(support, LARGEST_LENGTH)
+
+    @property
+    def section_radius(self) -> float:
+        """m, radius of the cross-section: the body with its corners."""
+        return max(self.metric.section_radius, math.sqrt(2) * self.body_radius() + CORNER_M)
+
     def _discretise(self, voxel_size: float) -> None:
         up, down = (whole_voxels(m, voxel_size) for m in (self.metric.above, self.metric.below))
-        wide = 2 * whole_voxels(self.metric.radius, voxel_size) + 1
+        widest = max(self.support_of(name) for name in self.names)
+        wide = 2 * whole_voxels(widest, voxel_size) + 1
         # Centred on the voxel it responds at, so twice the longer side high; ``kernels`` sets the
         # excess of the shorter side to zero.
         size = (2 * max(up, down) + 1, wide, wide)
@@ -129,18 +204,22 @@ class MetricSceneNet(GeneoModel):
     @property
     def reach(self) -> tuple[int, int, int]:
         z, y, x = super().reach
-        wide = whole_voxels(self.metric.section_radius, self.voxel_size)
+        wide = whole_voxels(self.section_radius, self.voxel_size)
         high = whole_voxels(self.metric.section_above, self.voxel_size)
         return z + high, y + wide, x + wide
 
-    def section(self, occupancy: Occupancy) -> tuple[np.ndarray, np.ndarray]:
-        """The occupied voxels in the cross-section of each one
-        (``scenenet.convolution.cross_section.neighbours``)."""
-        lengths = self.metric.section_radius, self.metric.section_above
-        return neighbours(occupancy, section_offsets(*lengths, self.voxel_size))
+    def section(self, occupancy: Occupancy) -> Section:
+        """The cross-section of each occupied voxel. With measured numbers it has empty voxels too,
+        because the axis of a wide tower is in the air."""
+        lengths = self.section_radius, self.metric.section_above
+        offsets = section_offsets(*lengths, self.voxel_size)
+        return section_of(occupancy, offsets, hollow=self.measured)
 
-    def argmax_rows(self, occupancy: Occupancy, observed: Tensor) -> np.ndarray:
-        return strongest(observed.detach().numpy(), *self.section(occupancy))
+    def responses(self, occupancy: Occupancy, kernels: Tensor) -> Tensor:
+        section = self.section(occupancy)
+        parts = convolve_at_voxels(occupancy, kernels, section.at)
+        rows = strongest(parts.sum(dim=0).numpy(), section.starts, section.rows)
+        return parts[:, torch.from_numpy(rows)]
 
     def forward(self, occupancy: Occupancy) -> Tensor:
         """Probability that each voxel is part of a tower, (B, D, H, W) in [0, 1].
@@ -148,15 +227,14 @@ class MetricSceneNet(GeneoModel):
         It is 0 in empty voxels, and there is no gradient.
         """
         kernel, _ = self.observer()
-        observed = convolve_at_voxels(occupancy, kernel.detach()[None])[0]
-        strongest_observed = observed[torch.from_numpy(self.argmax_rows(occupancy, observed))]
+        observed = self.responses(occupancy, kernel.detach()[None])[0]
         volume = torch.zeros(occupancy.n_voxels, dtype=observed.dtype)
-        volume[torch.from_numpy(occupancy.flat())] = torch.relu(torch.tanh(strongest_observed))
+        volume[torch.from_numpy(occupancy.flat())] = torch.relu(torch.tanh(observed))
         return volume.reshape(len(occupancy), *occupancy.shape)
 
     def shape_of(self, name: str) -> dict[str, Tensor]:
         stored = self._stored_shape(name)
-        ranges = {p.name: p.metric_range for p in self.parameters_of(name)}
+        ranges = {p.name: self.bounds_of(p) for p in self.parameters_of(name)}
         return {
             symbol: low * (high / low) ** torch.sigmoid(stored[symbol])
             for symbol, (low, high) in ranges.items()
@@ -168,12 +246,20 @@ class MetricSceneNet(GeneoModel):
         return torch.softmax(torch.stack([*free, torch.zeros(())]), dim=0)
 
     def kernels(self) -> Tensor:
-        lattice = Lattice.of_extent(self.kernel_size, self.metric.radius, self.voxel_size)
+        return torch.stack([self._kernel(name) for name in self.names])
+
+    def _kernel(self, name: str) -> Tensor:
+        """The sampled kernel of the GENEO called ``name``, (kz, ky, kx)."""
+        seen = self.voxel_size if self.measured else 0.0
+        support = self.support_of(name)
+        lattice = Lattice.of_extent(self.kernel_size, support, self.voxel_size, voxel=seen)
         ends = (lattice.z >= -self.metric.below * (1 + 1e-6)) & (
             lattice.z <= self.metric.above * (1 + 1e-6)
         )
         assert lattice.inside is not None
-        return self._sampled(lattice) * lattice.inside * ends * (self.voxel_size / COLUMN_M)
+        kernel = kernel_named(self.geneos[self.names.index(name)])
+        sampled = kernel.sample(lattice, self.shape_of(name))
+        return sampled * lattice.inside * ends * (self.voxel_size / COLUMN_M)
 
     def unit_of(self, parameter: ShapeParameter) -> str:
         return parameter.metric_unit
@@ -183,22 +269,31 @@ class MetricSceneNet(GeneoModel):
 
     def _assign(self, numbers: Mapping[str, float]) -> None:
         for name in self.names:
-            stored = self._stored_shape(name)
             for parameter in self.parameters_of(name):
-                low, high = parameter.metric_range
+                low, high = self.bounds_of(parameter)
                 value = numbers[f"{name}.{parameter.name}"]
                 if not low * (1 - 1e-4) <= value <= high * (1 + 1e-4):
                     raise InputError(
                         f"{name}.{parameter.name} = {value:g} {parameter.metric_unit} does not lie "
                         f"within {low:g} to {high:g}"
                     )
-                share = math.log(value / low) / math.log(high / low)
-                stored[parameter.name].data.fill_(_logit(share))
+                self._store(name, parameter, value)
         weights = [numbers[f"lambda.{name}"] for name in self.names]
         if min(weights) < 0:
             raise InputError("a mixing weight is negative")
         for name, weight in zip(self.names[:-1], weights, strict=False):
             self.mixing[name].data.fill_(math.log(max(weight, TINY) / max(weights[-1], TINY)))
+        self._discretise(self.voxel_size)
+
+    def set_numbers(self, numbers: np.ndarray) -> None:
+        super().set_numbers(numbers)
+        if self.measured:  # the kernels are as large as the lengths require
+            self._discretise(self.voxel_size)
+
+    def _store(self, name: str, parameter: ShapeParameter, value: float) -> None:
+        low, high = self.bounds_of(parameter)
+        share = math.log(value / low) / math.log(high / low)
+        self._stored_shape(name)[parameter.name].data.fill_(_logit(share))
 
     def with_kernel_size(self, kernel_size: KernelSize) -> Self:
         raise InputError(

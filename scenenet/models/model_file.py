@@ -19,6 +19,7 @@ from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL, Fit, Measurem
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
+from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
@@ -26,8 +27,10 @@ from scenenet.models.settings import LARGEST_KERNEL, KernelSize, MetricSettings
 
 FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
-METRIC_VERSION = 3
+METRIC_VERSION = 4
 """Version of the file of a SCENE-Net in metres."""
+SEARCHED_VERSION = 3
+"""Version of the same file before numbers were measured: all of them are searched."""
 FIELD_VERSION = 2
 """Version of the same file from version 0.1 of this package, where the lengths are ``field``."""
 
@@ -162,19 +165,28 @@ def _numbers(model: GeneoModel) -> dict[str, Any]:
         }
         geneos.append({"name": name, "kernel": geneo, "parameters": parameters})
     mixing = {name: values[f"lambda.{name}"] for name in model.names}
-    lengths = {"metric": model.metric.model_dump()} if isinstance(model, MetricSceneNet) else {}
+    lengths: dict[str, Any] = {}
+    if isinstance(model, MetricSceneNet):
+        lengths["metric"] = model.metric.model_dump()
+        known = {name: said.model_dump() for name, said in model.evidence.items()}
+        lengths |= {"evidence": known} if known else {}
     return {"units": model.units, "geneos": geneos, "mixing_weights": mixing} | lengths
 
 
 def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
     _check_head(data)
     geneos = [entry["kernel"] for entry in data["geneos"]]
-    key = {METRIC_VERSION: "metric", FIELD_VERSION: "field"}.get(data["format_version"])
+    version = data["format_version"]
     model: GeneoModel
-    if key is None:
+    if version == FORMAT_VERSION:
         model = SceneNet(geneos, _size(data))
     else:
-        model = MetricSceneNet(geneos, MetricSettings(**data[key]))
+        lengths = dict(data["field" if version == FIELD_VERSION else "metric"])
+        if version != METRIC_VERSION:
+            lengths["numbers"] = "searched"
+        model = MetricSceneNet(geneos, MetricSettings(**lengths))
+        said = data.get("evidence", {})
+        model.evidence = {name: Evidence(**found) for name, found in said.items()}
     numbers = {
         f"{entry['name']}.{symbol}": float(parameter["value"])
         for entry in data["geneos"]
@@ -251,7 +263,7 @@ def _check_head(data: Mapping[str, Any]) -> None:
         raise InputError(
             "not a model file of scenenet", remedy="Name a file that scenenet train wrote"
         )
-    readable = (FORMAT_VERSION, FIELD_VERSION, METRIC_VERSION)
+    readable = (FORMAT_VERSION, FIELD_VERSION, SEARCHED_VERSION, METRIC_VERSION)
     if data["format_version"] not in readable:
         raise InputError(
             f"model format {data['format_version']}; this version reads formats "

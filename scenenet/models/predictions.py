@@ -10,7 +10,7 @@ import torch
 
 from scenenet.convolution.coarsening import block_edge, coarsened
 from scenenet.convolution.convolve import convolve_at_voxels
-from scenenet.convolution.cross_section import strongest
+from scenenet.convolution.cross_section import Section, strongest
 from scenenet.convolution.observer import count_reached
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.dataset.batches import batch
@@ -82,7 +82,7 @@ class PreparedCrop:
 
     observed: Occupancy
     voxel_size: float
-    section: tuple[np.ndarray, np.ndarray]
+    section: Section
     row: np.ndarray
     tower: np.ndarray
     n_voxels: int
@@ -106,8 +106,9 @@ def prepare_crops(
 def occupied_probabilities(model: MetricSceneNet, crop: PreparedCrop) -> np.ndarray:
     """Probability of each occupied voxel, (M,) float32; empty voxels have probability 0."""
     kernel, _ = model.at(crop.voxel_size).observer()
-    observed = convolve_at_voxels(crop.observed, kernel.detach()[None])[0].numpy()
-    highest = observed[strongest(observed, *crop.section)]
+    section = crop.section
+    observed = convolve_at_voxels(crop.observed, kernel.detach()[None], section.at)[0].numpy()
+    highest = observed[strongest(observed, section.starts, section.rows)]
     return np.tanh(np.maximum(highest, 0))[crop.row]
 
 

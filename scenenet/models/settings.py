@@ -73,8 +73,18 @@ class MetricSettings(Settings):
     """The fixed lengths and rules of a SCENE-Net in metres. docs/method/operational_protocol.md
     gives the reasons."""
 
+    numbers: Literal["measured", "searched"] = Field(
+        "measured",
+        description="measured: radius, reach and their tolerances are those of the labelled "
+        "towers, measured in points, and kernels and cross-sections follow them; searched: all "
+        "numbers are those with the highest F0.5, from which radius and reach cannot be read "
+        "(docs/method/numbers.md)",
+    )
     radius: float = Field(
-        3.0, gt=0, le=LARGEST_LENGTH, description="m, horizontal reach of the kernels"
+        3.0,
+        gt=0,
+        le=LARGEST_LENGTH,
+        description="m, horizontal reach of the kernels; with measured numbers beyond the body",
     )
     above: Length = Field(6.0, description="m, upward reach of the kernels")
     below: Length = Field(6.0, description="m, downward reach of the kernels")

@@ -259,7 +259,6 @@ class TilePredictor:
         """
         import torch
 
-        from scenenet.convolution.convolve import convolve_at_voxels
         from scenenet.convolution.occupancy import Occupancy
         from scenenet.models.geneo_model import GeneoModel
 
@@ -275,16 +274,14 @@ class TilePredictor:
             for first, scene in zip(occupancy.offsets[:-1], scenes, strict=True)
         ])  # fmt: skip
         with torch.no_grad():
-            parts = convolve_at_voxels(occupancy, self._kernels)
+            # The shares are those of the voxel that the maximum of the cross-section is from.
+            parts = self.model.responses(occupancy, self._kernels)[:, torch.from_numpy(inner)]
             if isinstance(self.model, GeneoModel):
-                # The shares are those of the voxel that the maximum of the cross-section is from.
-                rows = self.model.argmax_rows(occupancy, parts.sum(dim=0))[inner]
-                parts = parts[:, torch.from_numpy(rows)]
                 observed = parts.sum(dim=0)
                 weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
                 shares = (parts / weight).T.contiguous().numpy()
             else:
-                observed = parts[0, inner]
+                observed = parts[0]
                 observed = observed if self._bias is None else observed + self._bias
                 shares = np.empty((len(inner), 0), np.float32)
             probability = torch.relu(torch.tanh(observed)).numpy()

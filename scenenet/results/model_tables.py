@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pandas as pd
 
 from scenenet.experiments.published import Thesis
+from scenenet.interpretability.determination import determination
 from scenenet.interpretability.parameter_sentences import Parameter, parameters_of, sentences
 from scenenet.results.folder import BOOSTED_TREES, Results
 from scenenet.results.initial_models import initial_model
@@ -67,12 +68,15 @@ def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
 
     Parameters in voxels are multiplied by the voxel size of the training. ``initial`` is the mean
     of the initial values over the seeds, ``initial_from`` says how they are known
-    (``scenenet.results.initial_models``).
+    (``scenenet.results.initial_models``). ``source`` to ``determined`` say whether the data
+    determine the number (``scenenet.interpretability.determination``); they are empty for models in
+    voxels. A number that is not determined has no sentence.
     """
     from scenenet.geneo.sentences import Reference
 
     columns = ["model", "parameter", "symbol", "unit", "mean", "std", "n_seeds", "initial",
-               "initial_from", "thesis", "sentence"]  # fmt: skip
+               "initial_from", "thesis", "source", "low", "high", "bound_met", "determined",
+               "sentence"]  # fmt: skip
     rows: list[dict[str, Any]] = []
     for model in results.models:
         found = numbers_in_metres(results, model)
@@ -81,8 +85,10 @@ def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
         means = found.after.mean()
         reference = Reference(found.step, _tower_width(results))
         texts = sentences(found.network, means.to_dict(), reference)
+        known = determination(found.networks)
         for parameter in found.parameters:
             name = parameter.name
+            said = known.get(name)
             rows.append(
                 {
                     "model": model,
@@ -95,7 +101,12 @@ def parameters(results: Results, thesis: Thesis) -> pd.DataFrame:
                     "initial": found.before[name].mean() if name in found.before else None,
                     "initial_from": found.began,
                     "thesis": _scaled(_published(thesis, name), 0.01),
-                    "sentence": texts[name],
+                    "source": None if said is None else said.source,
+                    "low": None if said is None else said.low,
+                    "high": None if said is None else said.high,
+                    "bound_met": None if said is None else said.bound_met,
+                    "determined": None if said is None else said.determined,
+                    "sentence": texts[name] if said is None or said.determined else None,
                 }
             )
     return pd.DataFrame(rows, columns=columns)
@@ -105,7 +116,7 @@ class Numbers(NamedTuple):
     """The parameters of a SCENE-Net from every seed, in metres.
 
     Attributes:
-        network: one of the trained models.
+        networks: the trained models.
         parameters: names and units, in order.
         after: trained values, a row per seed and a column per parameter.
         before: the same for the initial models; no columns if they are unknown.
@@ -113,12 +124,17 @@ class Numbers(NamedTuple):
         step: m, unit of the height of a kernel.
     """
 
-    network: GeneoModel
+    networks: list[GeneoModel]
     parameters: list[Parameter]
     after: pd.DataFrame
     before: pd.DataFrame
     began: str
     step: float
+
+    @property
+    def network(self) -> GeneoModel:
+        """One of the trained models."""
+        return self.networks[-1]
 
 
 def numbers_in_metres(results: Results, model: str) -> Numbers | None:
@@ -127,23 +143,25 @@ def numbers_in_metres(results: Results, model: str) -> Numbers | None:
     from scenenet.models.model_file import read_model
 
     after, before, began, sizes = [], [], set(), []
-    network, known = None, []
+    networks: list[GeneoModel] = []
+    known: list[Parameter] = []
     for result in results.of_model(model):
         trained, card = read_model(result.model_files[0]) if result.model_files else (None, None)
         if not isinstance(trained, GeneoModel) or card is None:
             continue
-        network, known = trained, parameters_of(trained, card.voxel_size)
+        networks.append(trained)
+        known = parameters_of(trained, card.voxel_size)
         after.append(_scaled_all(known, trained.shape_parameters()))
         sizes.append(card.voxel_size)
         start = initial_model(result, trained)
         if start is not None and isinstance(start.model, GeneoModel):
             before.append(_scaled_all(known, start.model.shape_parameters()))
             began.add(start.origin)
-    if network is None:
+    if not networks:
         return None
-    step = network.length_unit_m(sum(sizes) / len(sizes))
+    step = networks[-1].length_unit_m(sum(sizes) / len(sizes))
     origins = "; ".join(sorted(began))
-    return Numbers(network, known, pd.DataFrame(after), pd.DataFrame(before), origins, step)
+    return Numbers(networks, known, pd.DataFrame(after), pd.DataFrame(before), origins, step)
 
 
 def _scaled_all(known: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, float]:

@@ -86,7 +86,9 @@ def identity_of(
     """Digest of everything that a training depends on."""
 
     def summary(sample: VoxelSample) -> list[Any]:
-        return [sample.id, len(sample.index), int(sample.index.sum()), int(sample.tower.sum())]
+        shape = None if sample.shape is None else sample.shape.plain()
+        counts = len(sample.index), int(sample.index.sum()), int(sample.tower.sum())
+        return [sample.id, *counts, shape]
 
     samples = [[summary(sample) for sample in part] for part in (training, validation)]
     return digest([settings.model_dump(), seed, samples])

@@ -17,7 +17,9 @@ from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import PreparedCrop, curve_of, prepare_crops
 from scenenet.models.settings import ModelSettings, SearchSettings
 from scenenet.training import checkpoint as checkpoints
+from scenenet.training.determination import evidence
 from scenenet.training.evolution import Score, State, advance, begin, settled
+from scenenet.training.measured_numbers import FreeNumbers, measure
 from scenenet.training.objective import draws, scorer
 
 
@@ -33,23 +35,28 @@ def fit_by_search(
     Arguments and result are those of ``scenenet.training.train.fit``. A row of the history is a
     generation of the search: loss is 1 - F0.5 of the best numbers so far on the training crops, as
     the search weighs it, followed by the parameters. Several searches start, and the best of them
-    continues; the rows are those of that one, and ``search`` is its number.
+    continues; the rows are those of that one, and ``search`` is its number. Numbers that are
+    measured or fixed are not searched for (``scenenet.training.measured_numbers``).
     """
     model = new_model(settings, seed)
     assert isinstance(model, MetricSceneNet)
+    measured = measure(model, training)
+    lengths = {label: found.value for label, found in measured.items()}
+    model.set_shape_parameters(model.shape_parameters() | lengths)
+    free = FreeNumbers(model, measured)
     learnt = prepare_crops(model, training, settings.measurement)
     kept = prepare_crops(model, validation, settings.measurement)
-    score = scorer(model, learnt)
+    score = scorer(free, learnt)
     search = settings.search
 
     def row(state: State, seconds: float) -> dict[str, float]:
-        model.set_numbers(state.best)
+        free.set(state.best)
         return _row(model, state, kept, seconds)
 
     state, history = _resume(checkpoint)
     if state is None:
         started = time.perf_counter()
-        trials = [_trial(model, score, search, [seed, n]) for n in range(search.searches)]
+        trials = [_trial(free, score, search, [seed, n]) for n in range(search.searches)]
         chosen = max(range(len(trials)), key=lambda n: trials[n][-1].best_score)
         each = (time.perf_counter() - started) / max(1, search.trial)
         state = trials[chosen][-1]
@@ -63,19 +70,20 @@ def fit_by_search(
             state = settled(state, score)
         history.append(row(state, time.perf_counter() - started) | {"search": chosen})
         _save(checkpoint, state, history)
-    model.set_numbers(state.best)
+    free.set(state.best)
+    model.evidence = evidence(model, measured, lambda: model.best_step(curve_of(model, learnt))[1])
     return model, pd.DataFrame(history)
 
 
 def _trial(
-    model: MetricSceneNet, score: Score, settings: SearchSettings, entropy: list[int]
+    free: FreeNumbers, score: Score, settings: SearchSettings, entropy: list[int]
 ) -> list[State]:
     """The start and the first generations of a search.
 
     Some searches end with a negative sphere of weight 0, around which no draw is better. This is
     why several searches start.
     """
-    starts = draws(model, settings.starts, np.random.default_rng([*entropy, 0]))
+    starts = free.of(draws(free.model, settings.starts, np.random.default_rng([*entropy, 0])))
     states = [begin(starts, score, settings.step, settings.population, entropy)]
     for _ in range(min(settings.trial, settings.generations - 1)):
         states.append(advance(states[-1], score))

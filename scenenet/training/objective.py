@@ -16,14 +16,15 @@ import numpy as np
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import PreparedCrop, curve_of
 from scenenet.training.evolution import Score
+from scenenet.training.measured_numbers import FreeNumbers
 
 
-def scorer(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> Score:
-    """A function from a set of numbers (P,) to its weighted F0.5 at its own best tau."""
+def scorer(free: FreeNumbers, crops: Sequence[PreparedCrop]) -> Score:
+    """A function from a set of free numbers (F,) to the weighted F0.5 at its own best tau."""
 
     def score(numbers: np.ndarray) -> float:
-        model.set_numbers(numbers)
-        return model.best_step(curve_of(model, crops))[1]
+        free.set(numbers)
+        return free.model.best_step(curve_of(free.model, crops))[1]
 
     return score
 

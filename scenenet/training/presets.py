@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
 
 EPOCHS = 150
@@ -24,28 +27,35 @@ def is_searched(kind: str, protocol: str) -> bool:
 
 
 def preset(
-    kind: str, protocol: str, epochs: int | None = None, learning_rate: float | None = None
+    kind: str,
+    protocol: str,
+    epochs: int | None = None,
+    learning_rate: float | None = None,
+    geneos: Sequence[str] | None = None,
 ) -> ModelSettings:
     """The settings of a model of ``kind`` trained by ``protocol``.
 
     Args:
         epochs, learning_rate: of training by gradient; None for ``EPOCHS`` and ``LEARNING_RATES``.
+        geneos: kernels of a SCENE-Net; None for those of the thesis.
 
     Raises:
-        ValueError: one of them is given for a model that is fitted by a search.
+        ValueError: epochs or rate are given for a model that is fitted by a search, a kernel is
+            unknown, or the model has no kernels to choose.
     """
+    kernels: dict[str, Any] = {} if geneos is None else {"geneos": tuple(geneos)}
     if is_searched(kind, protocol):
         if epochs is not None or learning_rate is not None:
             raise ValueError("a search has no epochs and no learning rate")
-        return ModelSettings(name=kind, kind=kind, protocol=protocol)
+        return ModelSettings(name=kind, kind=kind, protocol=protocol, **kernels)
     training = TrainingSettings(
         init="informed" if protocol == "operational" else "thesis",
         epochs=epochs or EPOCHS,
         learning_rate=learning_rate or LEARNING_RATES[protocol],
     )
     if kind == "cnn":  # the protocol of a CNN is its training
-        return ModelSettings(name=kind, kind=kind, training=training)
-    return ModelSettings(name=kind, kind=kind, protocol=protocol, training=training)
+        return ModelSettings(name=kind, kind=kind, training=training, **kernels)
+    return ModelSettings(name=kind, kind=kind, protocol=protocol, training=training, **kernels)
 
 
 def validation_share(kind: str, protocol: str) -> float:

@@ -45,7 +45,8 @@ def test_initial_kernels_are_shown_at_the_tuned_size():
 
 
 def test_the_initial_model_of_a_search_is_the_first_row_of_its_history():
-    settings = ModelSettings(name="m", kind="scenenet", protocol="operational")
+    searched = MetricSettings(numbers="searched")
+    settings = ModelSettings(name="m", kind="scenenet", protocol="operational", metric=searched)
     trained = new_model(settings, 3).at(0.5)
     assert isinstance(trained, GeneoModel)
     first = trained.shape_parameters() | {"cylinder.r": 0.7}

@@ -23,7 +23,8 @@ from scenenet.training import metric_search
 from scenenet.training.train import fit
 from scenenet.training.tuning import choose
 
-SMALL = MetricSettings(radius=2.0, above=3.0, below=3.0)
+SMALL = MetricSettings(numbers="searched", radius=2.0, above=3.0, below=3.0)
+"""All eleven numbers are searched; ``test_measured_numbers.py`` has those that are measured."""
 
 
 def settings(generations: int = 6, **changes) -> ModelSettings:
@@ -156,7 +157,7 @@ def test_half_the_voxel_size_covers_the_same_metres():
 def test_kernels_of_too_many_voxels_are_refused():
     """The default lengths on voxels of 2 cm: 54 million voxels."""
     with pytest.raises(InputError, match=r"601x301x301 voxels of 0\.02 m.*at most 64"):
-        MetricSceneNet().at(0.02)
+        MetricSceneNet(metric=MetricSettings(numbers="searched")).at(0.02)
 
 
 def test_a_model_of_fine_grids_has_the_kernels_of_the_blocks_that_it_observes(tmp_path):
@@ -186,7 +187,7 @@ def test_a_column_of_a_given_height_has_the_same_response_on_every_grid():
 
 
 def test_kernels_lie_within_their_lengths_and_sum_to_zero():
-    lengths = MetricSettings(radius=2.0, above=4.0, below=2.0)
+    lengths = MetricSettings(numbers="searched", radius=2.0, above=4.0, below=2.0)
     kernels = net(2, lengths).kernels()
     assert kernels.shape[1:] == (9, 5, 5)
     assert (kernels[:, :2] == 0).all()  # 2 m down, 4 m up
@@ -216,7 +217,7 @@ def test_its_file_has_units_of_metres_and_reads_back(tmp_path):
     write_model(tmp_path / "m.json", model, card_for(model))
     written = json.loads((tmp_path / "m.json").read_text())
     assert written["units"] == "m"
-    assert written["format_version"] == 3
+    assert written["format_version"] == 4
     assert written["metric"]["radius"] == 2.0
     radius, sigma = (written["geneos"][0]["parameters"][s] for s in ("r", "sigma"))
     assert (radius["unit"], sigma["unit"]) == ("m", "m^2")

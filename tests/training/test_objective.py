@@ -27,7 +27,8 @@ from scenenet.training.objective import draws
 
 
 def model(seed: int = 0) -> SceneNet:
-    return MetricSceneNet(metric=MetricSettings(), generator=torch.Generator().manual_seed(seed))
+    lengths = MetricSettings(numbers="searched")
+    return MetricSceneNet(metric=lengths, generator=torch.Generator().manual_seed(seed))
 
 
 def bowl(x: np.ndarray) -> float:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import ValidationError
 
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
@@ -19,7 +20,7 @@ from scenenet.cli.options import (
     cube,
 )
 from scenenet.cli.output import show, training_lines
-from scenenet.models.settings import LARGEST_RATE
+from scenenet.models.settings import LARGEST_RATE, THESIS_GENEOS
 from scenenet.training import presets
 
 EXAMPLES = (
@@ -60,6 +61,14 @@ LearningRate = Annotated[
         f"{presets.LEARNING_RATES['thesis']:g} for protocol thesis]",
     ),
 ]
+Geneos = Annotated[
+    str | None,
+    typer.Option(
+        help="Kernels of a SCENE-Net, separated by commas. cylinder,surroundings has only the "
+        "three numbers that do the work (docs/method/numbers.md).  [default: "
+        f"{','.join(THESIS_GENEOS)}]",
+    ),
+]
 Validation = Annotated[
     float | None,
     typer.Option(
@@ -84,6 +93,7 @@ def command(
     seeds: Seeds = 5,
     epochs: Epochs = None,
     learning_rate: LearningRate = None,
+    geneos: Geneos = None,
     resolution: Resolution = 64,
     validation: Validation = None,
     overwrite: Overwrite = False,
@@ -102,7 +112,11 @@ def command(
     if out.suffix != ending:
         raise typer.BadParameter(f"a {kind} is written to a {ending} file", param_hint="--out")
     try:
-        settings = presets.preset(kind.value, protocol.value, epochs, learning_rate)
+        names = None if geneos is None else [name.strip() for name in geneos.split(",")]
+        settings = presets.preset(kind.value, protocol.value, epochs, learning_rate, names)
+    except ValidationError as error:
+        message = error.errors()[0]["msg"].removeprefix("Value error, ")
+        raise typer.BadParameter(message, param_hint="--geneos") from None
     except ValueError as error:
         option = "--epochs" if learning_rate is None else "--learning-rate"
         raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None

@@ -13,7 +13,10 @@ from scenenet.geneo.kernel import (
     GeneoKernel,
     Lattice,
     ShapeParameter,
+    column,
     gaussian_shell,
+    normalised,
+    seen_shell,
     shell_sigma,
     zero_sum,
 )
@@ -60,13 +63,17 @@ class Arrow(GeneoKernel):
     g(x) = exp(-(d^2 - r^2)^2 / (2 sigma^2))                 where z < h
            exp(-(d^2 - r_c^2 sin theta)^2 / (2 sigma^2))     where z >= h
     theta = beta pi / (2 + z - h),  d = ||pi_-3(x - c)||,  summing to zero.
+
+    In kernels with measured numbers it is the head alone: zero where z < h and within r of the
+    axis. A column below the head would be a second cylinder, and no data could say which of the two
+    has the weight.
     """
 
     name = "arrow"
     sums_to_zero = True
     parameters = (
         BODY_RADIUS,
-        shell_sigma("tolerance around both radii", _head_sigma),
+        shell_sigma("tolerance around both radii", _head_sigma, (0.01, 100.0), "reach_spread"),
         ShapeParameter(
             "r_c",
             0.5,
@@ -75,6 +82,8 @@ class Arrow(GeneoKernel):
             "reach of the tower's head, where the conductors meet",
             metric=(0.3, 1.5),
             sentence=_head_reach,
+            physical=(0.5, 10.0),
+            measured="reach",
         ),
         ShapeParameter(
             "beta",
@@ -84,6 +93,9 @@ class Arrow(GeneoKernel):
             "inclination of the head",
             metric=(0.05, 0.95),
             sentence=_head_slope,
+            physical=(0.05, 1.0),
+            # The base of the head then has the radius r_c, the reach.
+            fixed=1.0,
         ),
     )
 
@@ -91,6 +103,12 @@ class Arrow(GeneoKernel):
         head_slices = max(1, round(CONE_SHARE * lattice.size[0]))
         above_h = lattice.z - lattice.z[lattice.size[0] - head_slices]
         theta = shape["beta"] * math.pi / (2 + above_h.clamp(min=0))
+        if lattice.voxel:
+            ring = seen_shell(lattice, shape["r_c"] * torch.sin(theta).sqrt(), shape["sigma"])
+            return zero_sum(
+                normalised(ring * (above_h >= 0) * (1 - column(lattice, shape["r"]))),
+                lattice.inside,
+            )
         radius_squared = torch.where(
             above_h < 0, shape["r"] ** 2, shape["r_c"] ** 2 * torch.sin(theta)
         )

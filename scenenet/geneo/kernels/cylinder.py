@@ -11,6 +11,7 @@ from scenenet.geneo.kernel import (
     GeneoKernel,
     Lattice,
     gaussian_shell,
+    seen_shell,
     shell_sigma,
     zero_sum,
 )
@@ -30,9 +31,12 @@ class Cylinder(GeneoKernel):
     sums_to_zero = True
     parameters = (
         BODY_RADIUS,
-        shell_sigma("tolerance around that radius", _body_sigma),
+        shell_sigma("tolerance around that radius", _body_sigma, (0.001, 10.0), "spread"),
     )
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
+        if lattice.voxel:
+            shell = seen_shell(lattice, shape["r"], shape["sigma"])
+            return zero_sum(shell.expand(lattice.size), lattice.inside)
         shell = gaussian_shell(lattice.planar_squared, shape["r"] ** 2, shape["sigma"])
         return zero_sum(shell.expand(lattice.size), lattice.inside)

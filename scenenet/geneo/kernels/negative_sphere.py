@@ -12,6 +12,7 @@ from scenenet.geneo.kernel import (
     Lattice,
     ShapeParameter,
     gaussian_shell,
+    per_support,
     shell_sigma,
 )
 from scenenet.geneo.registry import register
@@ -66,4 +67,5 @@ class NegativeSphere(GeneoKernel):
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
         squared = lattice.planar_squared + lattice.z**2
-        return gaussian_shell(squared, shape["r"] ** 2, shape["sigma"]) - shape["omega"]
+        kernel = gaussian_shell(squared, shape["r"] ** 2, shape["sigma"]) - shape["omega"]
+        return per_support(kernel, lattice)

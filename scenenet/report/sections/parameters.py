@@ -42,6 +42,13 @@ def _numbers(context: ReportContext) -> list[Block]:
         Column("thesis", "thesis", "number", published=True),
         Column("sentence", "meaning", "sentence"),
     ]
+    evidence = [
+        Column("source", "comes from"),
+        Column("low", "lowest", "number"),
+        Column("high", "highest", "number"),
+        Column("bound_met", "seeds at a bound", "score"),
+        Column("determined", "determined", "yes"),
+    ]
     shown = frame.assign(
         parameter=frame["parameter"].str.replace("_", " ").str.replace(".", ": "),
         unit=frame["unit"].map({"m": "m", "m^2": "m²", "1": "none"}),
@@ -55,7 +62,15 @@ def _numbers(context: ReportContext) -> list[Block]:
             "metres. The sentences are derived from the formulas of the kernels (thesis 4.4) with "
             f"the mean values.{start}"
         )
-        blocks.append(table(rows, columns, caption, "tables/parameters.csv"))
+        with_evidence = rows["source"].notna().any()
+        if with_evidence:
+            caption += (
+                " “Lowest” and “highest” are the values that the training data allow: two standard "
+                "errors around a measurement in points, or F0.5 within 0.01 of the best with the "
+                "other numbers kept. Numbers that the data do not determine have no sentence."
+            )
+        listed = columns[:-1] + evidence + columns[-1:] if with_evidence else columns
+        blocks.append(table(rows, listed, caption, "tables/parameters.csv"))
     return blocks
 
 

@@ -1,0 +1,103 @@
+"""Which numbers of a trained SCENE-Net the training crops determine (docs/method/numbers.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from scenenet.models.evidence import Evidence
+from scenenet.models.metric_scenenet import MetricSceneNet
+from scenenet.training.measured_numbers import Measured
+
+LOST = 0.01
+"""Loss of F0.5 that is too small to prefer one value over another: two seeds differ by as much."""
+
+STEPS = 24
+"""Values between the bounds of a number at which the score is measured."""
+
+HALVINGS = 3
+"""How often the last step is halved."""
+
+WEIGHTS = 1e-3, 0.999
+"""Mixing weights between which the score is measured."""
+
+
+def evidence(
+    model: MetricSceneNet, measured: Mapping[str, Measured], score: Callable[[], float]
+) -> dict[str, Evidence]:
+    """What the training crops say about each number of ``model``.
+
+    Args:
+        measured: from ``scenenet.training.measured_numbers.measure``.
+        score: F0.5 of the model with its present numbers, as the search weighs it.
+    """
+    found = {}
+    fixed = model.fixed_numbers()
+    values = model.shape_parameters()
+    best = score()
+    for name in model.names:
+        for parameter in model.parameters_of(name):
+            label = f"{name}.{parameter.name}"
+            bounds, value = model.bounds_of(parameter), values[label]
+            if label in measured:
+                between = measured[label].low, measured[label].high
+                found[label] = Evidence.of("points", value, between, bounds)
+            elif label in fixed:
+                found[label] = Evidence.of("fixed", value, (value, value), bounds)
+            else:
+                between = _profile(model, label, bounds, best, score)
+                found[label] = Evidence.of("score", value, between, bounds)
+    for name in model.names if len(model.names) > 1 else ():
+        label = f"lambda.{name}"
+        between = _profile(model, label, WEIGHTS, best, score)
+        found[label] = Evidence.of("score", values[label], between, WEIGHTS)
+    model.set_shape_parameters(values)
+    return found
+
+
+def _profile(
+    model: MetricSceneNet,
+    label: str,
+    bounds: tuple[float, float],
+    best: float,
+    score: Callable[[], float],
+) -> tuple[float, float]:
+    """The lowest and the highest value of a number, with all values between them, at which the
+    score is hardly lower than ``best``. The other numbers are kept; weights keep their ratios."""
+    values = model.shape_parameters()
+    at = values[label]
+
+    def between(good: float, bad: float) -> float:
+        """The last value from ``good`` towards ``bad`` at which the score is hardly lower."""
+        for _ in range(HALVINGS):
+            middle = float(np.sqrt(good * bad))
+            model.set_shape_parameters(_changed(values, label, middle))
+            good, bad = (good, middle) if score() < best - LOST else (middle, bad)
+        return good
+
+    tried = np.geomspace(*bounds, STEPS)
+    ends = []
+    for outwards in (tried[tried < at][::-1], tried[tried > at]):
+        end = at
+        for value in outwards:
+            model.set_shape_parameters(_changed(values, label, float(value)))
+            if score() < best - LOST:
+                end = between(end, float(value))
+                break
+            end = float(value)
+        ends.append(end)
+    model.set_shape_parameters(values)
+    return ends[0], ends[1]
+
+
+def _changed(values: Mapping[str, float], label: str, value: float) -> dict[str, float]:
+    """All numbers with another value of one."""
+    changed = dict(values)
+    if label.startswith("lambda."):
+        others = 1 - values[label]
+        for other in values:
+            if other.startswith("lambda.") and others > 0:
+                changed[other] *= (1 - value) / others
+    changed[label] = value
+    return changed

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from scenenet.synthetic.returns.conductors import catenary, string_conductors
-from scenenet.synthetic.scene.towers import KINDS, place, sample
+from scenenet.synthetic.scene.towers import KINDS, Size, place, sample
+from scenenet.synthetic.settings import SyntheticSettings
 
 KINDS_AND_CIRCUITS = [(kind, circuits) for kind in KINDS for circuits in (1, 2)]
 
@@ -80,3 +82,22 @@ def test_scan_lines_meet_conductors_in_the_scanned_part_only():
     assert len(points) == pytest.approx(2 * 50 / 0.2 * 0.8, rel=0.1)
     steps = np.diff(np.sort(points[points[:, 1] < 0, 0]))
     assert np.median(steps) == pytest.approx(0.2, rel=0.2), "in steps, not anywhere"
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_width_and_reach_can_be_prescribed(kind):
+    """The body is as wide at a third of its height as said, and the longest cross-arm as long."""
+    height, size = 24.0, Size(width=1.6, reach=5.0)
+    tower = KINDS[kind](height, 1, 0, size)
+    points = sample(tower.members, 400.0, np.random.default_rng(0))
+    body = points[np.abs(points[:, 2] - height / 3) < 1]
+    assert 2 * np.abs(body[:, 0]).max() == pytest.approx(1.6, abs=0.45)
+    assert np.abs(points[:, 0]).max() == pytest.approx(5.0, abs=0.15)
+    assert np.abs(tower.attachments[:, 0]).max() == pytest.approx(5.0)
+    of_its_kind = KINDS[kind](height, 1, 0)
+    np.testing.assert_array_equal(KINDS[kind](height, 1, 0, Size()).members, of_its_kind.members)
+
+
+def test_crossarms_that_stay_in_the_body_are_refused():
+    with pytest.raises(ValidationError, match="do not leave a body 4 m wide"):
+        SyntheticSettings(body_width=4.0, arm_reach=2.0)

@@ -13,8 +13,10 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from scenenet.dataset.crops import Crop
-from scenenet.detection.conductors import FAR, SCALES, leaving_spans
-from scenenet.detection.structure import SIZE_M, BodyTests, Structure, lattice_on, measure_structure
+from scenenet.detection.candidates import SURROUNDINGS_M
+from scenenet.detection.conductors import ConductorPoints, Span
+from scenenet.detection.detect import surroundings_in
+from scenenet.detection.structure import BodyTests, Structure, measure_structure
 from scenenet.pointcloud.cloud import PointCloud
 
 BODY_SHARE = 0.25, 0.6
@@ -26,6 +28,9 @@ portals."""
 
 TESTS = BodyTests(height=4.0, upright=0.5, free=1 / 3)
 """What the body of a labelled tower has to be to be measured."""
+
+LOWEST_M = 3.0
+"""m above the ground from which conductors are looked for, half the height of the lowest tower."""
 
 FEWEST, FEWEST_OF_ARMS = 10, 5
 """Smallest number of points of a body and of crossarms that are measured; an arm of a pole has few
@@ -65,16 +70,19 @@ class TowerShape:
 def measure_shape(crop: Crop, cloud: PointCloud) -> TowerShape | None:
     """The shape of the tower in the middle of a crop; None where no body stands free."""
     centre = np.array([crop.x, crop.y])
-    near = np.hypot(*(cloud.xyz[:, :2] - centre).T) <= FAR + max(SCALES)
+    near = np.hypot(*(cloud.xyz[:, :2] - centre).T) <= SURROUNDINGS_M
     labelled = cloud.xyz[near & cloud.is_tower]
     if len(labelled) == 0:
         return None
     origin = np.array([*centre, labelled[:, 2].min()])
     points, height = cloud.xyz[near] - origin, float(np.ptp(labelled[:, 2]))
     axis, crossarm = np.zeros(2), max(3.0, CROSSARM * height)
-    places = lattice_on(points, axis, SIZE_M)
-    spans = tuple(leaving_spans(places, (0.0, 0.0), 0.0, height, crossarm, SIZE_M))
-    structure = measure_structure(points, axis, height, spans, crossarm, TESTS, amid=False)
+    conductors = ConductorPoints(surroundings_in(points), LOWEST_M)
+
+    def leaving(axis: np.ndarray, base: float, height: float, crossarm: float) -> list[Span]:
+        return conductors.leaving(axis, base, height, crossarm, points)
+
+    structure = measure_structure(points, leaving, axis, 0.0, height, crossarm, TESTS, amid=False)
     return None if structure is None else shape_of(structure, points)
 
 

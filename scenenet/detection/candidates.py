@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from scenenet.detection.conductors import FAR, SCALES
+from scenenet.detection.conductor_rules import FAR, SCALES
 from scenenet.detection.settings import DetectionSettings
 
 SURROUNDINGS_M = FAR + max(SCALES)

@@ -7,75 +7,45 @@ below, a roof is as wide as it is long, and no conductor leaves a street light.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 
-HEAD = 0.6
-"""Share of the height above which conductors are searched. Ground, shrubs and the body are below,
-and of several levels of conductors at least one is in the upper two fifths."""
+from scenenet.detection.conductor_rules import (
+    ALONE_M,
+    ATTACHED,
+    CONTINUES_M,
+    FAR,
+    FREE_AIR,
+    FREE_AIR_SHARE,
+    GAP,
+    HEAD,
+    LEVEL_M,
+    LINE_CELL_M,
+    LINE_M,
+    MAX_LEVELS,
+    MIN_ALONE,
+    MIN_ANGLE,
+    MIN_LENGTH,
+    MIN_VOXELS,
+    NEAR,
+    RISE,
+    SCALES,
+    SECTOR,
+    TESTED_CELL_M,
+)
 
-FREE_AIR = 3.0
-"""m of empty space below a conductor, about the clearance that is kept from trees."""
+BLOCK_M, BLOCKS_KEPT = 32.0, 256
+"""m, edge of the blocks in which points on conductors are looked for, and number in memory."""
 
-FREE_AIR_SHARE = 1 / 8
-"""The same as a share of the height. The levels of conductors are this far apart; the storeys of a
-building, three to four metres, are not."""
+GROUND = 5
+"""Percentile of the elevations in a block that counts as its ground."""
 
-NEAR, FAR = 3.0, 20.0
-"""m from the axis between which conductors are searched: outside the body, and as far as the crop
-of a tower reaches."""
-
-RISE = 0.5
-"""Steepest slope of a conductor; at the head of a tower on a slope it is about a third."""
-
-SCALES = 2.0, 4.0, 8.0
-"""m, radii of the neighbourhoods in which shape is measured. A small neighbourhood shows a single
-conductor; in a large one, conductors one to three metres apart look like one ribbon. Three radii
-cover all distances between conductors."""
-
-THIN = 0.25
-"""Largest variance across a conductor, or a ribbon of conductors, as a share of the variance along
-it. The edge of a half plane, such as a roof, has 0.28."""
-
-MIN_VOXELS = 5
-"""Smallest number of voxels for which a direction is measured."""
-
-SECTOR = 15.0
-"""Largest difference in degrees between the bearings within a span: voxels are coarse, and
-conductors diverge from the head to the crossarms of the next tower."""
-
-MIN_ANGLE = 45.0
-"""Smallest angle in degrees between two spans; a line never turns back on itself."""
-
-ATTACHED = 10.0
-"""m from the axis up to which a conductor is straight enough to say where it is attached."""
-
-GAP = 3.0
-"""m, largest gap along a conductor that a scanner may have missed."""
-
-LINE_M = 6.0
-"""m, radius in which points are tested for a line; a conductor is straight over twice this."""
-
-LINE_THICK_M = 0.3
-"""m, radius of a line: a conductor or a bundle with the noise of its points."""
-
-RING_M = 0.5, 0.8
-"""m, radii of the free ring around a line; a bundle is narrower and the next conductor further."""
-
-LINE_POINTS = 4
-"""Smallest number of points on a line."""
-
-LINE_BESIDE = 0.25
-"""Largest number of points in the ring around a line per point on it. A surface has one, a crown
-four."""
-
-LINE_SAMPLE = 120
-"""Points of a span that are tested, and directions that are tried."""
-
-MIN_LENGTH = 7.0
-"""m, shortest span; rows of treetops are seldom longer."""
+Surroundings = Callable[[np.ndarray, float], np.ndarray]
+"""A function of a position (2,) m and a radius in m, which returns the points, or the centres of
+the occupied voxels, within this radius in plan, (M, 3) m."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +61,7 @@ class Span:
         left, right: m, least and greatest distance to the right of the axis at which they pass it,
             as seen along the bearing.
         lowest, highest: m, heights of the lowest and the highest one above the foot, at the tower.
-        places: (M, 3) m, centres of the voxels on the conductors.
-        thin: share of the points there that are on a thin line; NaN if it was not measured.
+        places: (M, 3) m, points or centres of voxels on the conductors.
     """
 
     bearing: float
@@ -104,7 +73,6 @@ class Span:
     lowest: float
     highest: float
     places: np.ndarray = field(repr=False, compare=False)
-    thin: float = float("nan")
 
 
 def leaving_spans(
@@ -138,10 +106,128 @@ def leaving_spans(
     hanging = near[at_head & _hangs(near, voxel_size, free_air)]
     if len(hanging) < MIN_VOXELS:
         return []
+    from scenenet.detection.linear import long_and_thin  # compiled: half a second to import
+
     off_axis = np.hypot(hanging[:, 0], hanging[:, 1])
     # A conductor may pass the axis at up to ``crossarm``, so FAR along it can be further away.
     candidate = (off_axis >= NEAR) & (off_axis <= np.hypot(FAR, crossarm))
-    place, heading, slope = _thin(hanging, candidate)
+    place, heading, slope = long_and_thin(hanging, candidate)
+    spans = _spans(place, heading, slope, near, crossarm)
+    return [replace(span, places=span.places + np.array([*axis, base])) for span in spans]
+
+
+class ConductorPoints:
+    """The points of a survey that lie on conductors, looked for in a block when it is needed."""
+
+    def __init__(self, points: Surroundings, lowest: float) -> None:
+        """Nothing is looked for yet.
+
+        Args:
+            points: gives the points around a position.
+            lowest: m above the ground; lower points are not on conductors.
+        """
+        self._points, self._lowest = points, lowest
+        self._block = lru_cache(maxsize=BLOCKS_KEPT)(self._in_block)
+
+    def leaving(
+        self, axis: np.ndarray, base: float, height: float, crossarm: float, around: np.ndarray
+    ) -> list[Span]:
+        """Directions in which conductors leave a tower, the longest first.
+
+        Args:
+            axis: (2,) m.
+            base, height, crossarm: as in ``leaving_spans``.
+            around: (N, 3) m, what is around the tower; it shows where the data end.
+        """
+        foot = np.array([*axis, base])
+        places, directions, others = self._near(axis, float(np.hypot(FAR, crossarm)))
+        offset = places - foot
+        distance = np.hypot(offset[:, 0], offset[:, 1])
+        here = (distance >= NEAR) & (offset[:, 2] >= HEAD * height)
+        here &= offset[:, 2] <= height + RISE * distance
+        level = np.hypot(directions[here, 0], directions[here, 1])
+        heading, slope = directions[here, :2] / level[:, None], directions[here, 2] / level
+        spans = _spans(offset[here], heading, slope, around - foot, crossarm)
+        spans = [replace(span, places=span.places + foot) for span in spans]
+        return [
+            span
+            for span in spans
+            if _alone(span, others) >= MIN_ALONE and _levels(span) <= MAX_LEVELS
+        ]
+
+    def _near(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions (M, 3) m and directions (M, 3) of the points on conductors within a radius, and
+        positions (N, 3) m of other points."""
+        low, high = (np.floor((place + r) / BLOCK_M).astype(int) for r in (-radius, radius))
+        blocks = [
+            self._block(x, y)
+            for x in range(low[0], high[0] + 1)
+            for y in range(low[1], high[1] + 1)
+        ]
+        places, directions, others = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        inside = np.hypot(*(places[:, :2] - place).T) <= radius
+        beside = np.hypot(*(others[:, :2] - place).T) <= radius
+        return places[inside], directions[inside], others[beside]
+
+    def _in_block(self, x: int, y: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        from scenenet.detection.lines import points_on_lines  # compiled: half a second to import
+
+        middle = (np.array([x, y]) + 0.5) * BLOCK_M
+        near = self._points(middle, BLOCK_M / np.sqrt(2) + LINE_M)
+        if len(near) == 0:
+            return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3))
+        ground = np.percentile(near[:, 2], GROUND)
+        near = near[near[:, 2] >= ground + self._lowest - RISE * LINE_M]
+        near = near[_one_per_cell(near, LINE_CELL_M)]
+        tested = _one_per_cell(near, TESTED_CELL_M)
+        inside = np.abs(near[tested, :2] - middle).max(axis=1) <= BLOCK_M / 2
+        tested = tested[inside & (near[tested, 2] >= ground + self._lowest)]
+        rows, directions = points_on_lines(near, tested)
+        return near[rows], directions, near[np.setdiff1d(tested, rows)]
+
+
+def _one_per_cell(points: np.ndarray, size: float) -> np.ndarray:
+    """Rows (M,) of the first of the points (N, 3) m in each cell of ``size`` m."""
+    cells = np.floor(points / size).astype(np.int64)
+    return np.sort(np.unique(cells, axis=0, return_index=True)[1])
+
+
+def _alone(span: Span, others: np.ndarray) -> float:
+    """Share of the points around a span that lie on conductors. A roof or a facade with few points
+    shows lines too, amid others; conductors hang alone, or close to a tree at some places.
+
+    Args:
+        others: (N, 3) m, tested points that are not on lines.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(others) == 0:
+        return 1.0
+    beside = cKDTree(span.places).query(others, distance_upper_bound=ALONE_M)[0] <= ALONE_M
+    return len(span.places) / (len(span.places) + int(beside.sum()))
+
+
+def _levels(span: Span) -> int:
+    """Largest number of conductors above one another, at least ``LEVEL_M`` m apart."""
+    heading = np.array([np.sin(np.radians(span.bearing)), np.cos(np.radians(span.bearing))])
+    ahead = span.places[:, :2] @ heading
+    across = np.round(span.places[:, 0] * heading[1] - span.places[:, 1] * heading[0])
+    height = span.places[:, 2] - span.slope * ahead
+    planes = [np.sort(height[across == plane]) for plane in np.unique(across)]
+    return max(1 + int((np.diff(plane) >= LEVEL_M).sum()) for plane in planes)
+
+
+def _spans(
+    place: np.ndarray, heading: np.ndarray, slope: np.ndarray, near: np.ndarray, crossarm: float
+) -> list[Span]:
+    """The spans of places (M, 3) m on conductors, relative to the foot.
+
+    Args:
+        heading: (M, 2) unit vectors along the conductors.
+        slope: (M,) their rise per metre in that direction.
+        near: (N, 3) m, all that is around; it shows where the data end.
+        crossarm: m, largest distance at which a conductor passes the axis.
+    """
     # s is the distance along the conductor, t the distance at which it passes the axis. The heading
     # points away from the tower.
     s = np.einsum("ni,ni->n", place[:, :2], heading)
@@ -150,7 +236,7 @@ def leaving_spans(
     t = np.abs(place[:, 0] * heading[:, 1] - place[:, 1] * heading[:, 0])
     leaves = (s >= NEAR) & (s <= FAR) & (t <= crossarm)
     place, slope, s = place[leaves], slope[leaves], s[leaves]
-    towards = _bearing(near)
+    distance, towards = np.hypot(near[:, 0], near[:, 1]), _bearing(near)
     spans = []
     for bearing, length, members in _runs(_bearing(heading[leaves]), s):
         end = distance[_angle(towards, bearing) <= SECTOR].max(initial=NEAR)
@@ -158,8 +244,7 @@ def leaving_spans(
         rise = float(np.median(slope[members]))
         attached = _attachments(place[members], s[members], bearing, rise)
         followed = min(1.0, length / available)
-        places = place[members] + np.array([*axis, base])
-        spans.append(Span(bearing, length, followed, rise, *attached, places))
+        spans.append(Span(bearing, length, followed, rise, *attached, place[members]))
     return spans
 
 
@@ -181,55 +266,9 @@ def _attachments(
     metre = np.floor(s[near]).astype(int)
     same = (np.abs(passes[:, None] - passes[None]) <= 1.0).all(axis=2)
     continues = np.array([len(np.unique(metre[row])) for row in same])
-    conductor = passes[2 * continues >= continues.max()]
+    conductor = passes[continues >= min(CONTINUES_M, continues.max())]
     (left, lowest), (right, highest) = conductor.min(axis=0), conductor.max(axis=0)
     return float(left), float(right), float(lowest), float(highest)
-
-
-def thin_share(points: np.ndarray, span: Span, voxel_size: float) -> float:
-    """Share of the points of a span that lie on a straight line with next to nothing beside it.
-
-    Voxels cannot distinguish a conductor from a branch or the edge of a roof that is half a metre
-    thick; points can.
-
-    Args:
-        points: (N, 3) m, at least those in the voxels of the span.
-        voxel_size: m, of the voxels of the span.
-    """
-    from scipy.spatial import cKDTree
-
-    _, nearest = cKDTree(span.places).query(points)
-    inside = np.abs(points - span.places[nearest]).max(axis=1) <= voxel_size / 2 + 1e-6
-    on_span = points[inside]
-    if len(on_span) < MIN_VOXELS:
-        return 0.0
-    tree = cKDTree(on_span)
-    heading = np.array([np.sin(np.radians(span.bearing)), np.cos(np.radians(span.bearing))])
-    rows = np.unique(np.linspace(0, len(on_span) - 1, LINE_SAMPLE).astype(int))
-    lines = 0
-    for row in rows:
-        offset = on_span[sorted(tree.query_ball_point(on_span[row], LINE_M))] - on_span[row]
-        lines += _on_line(offset, heading)
-    return lines / len(rows)
-
-
-def _on_line(offset: np.ndarray, heading: np.ndarray) -> bool:
-    """Whether a thin line with about the ``heading`` (2,) goes through the point that the
-    ``offset`` (N, 3) m of its neighbours are relative to."""
-    far = offset[np.abs(offset[:, :2] @ heading) > LINE_M / 4]
-    level = np.hypot(far[:, 0], far[:, 1])
-    forwards = np.abs(far[:, :2] @ heading) > np.cos(np.radians(SECTOR)) * level
-    far = far[forwards & (np.abs(far[:, 2]) <= RISE * level)]
-    if len(far) == 0:
-        return False
-    far = far[:: -(-len(far) // LINE_SAMPLE)]
-    direction = far / np.linalg.norm(far, axis=1)[:, None]
-    square = np.einsum("ni,ni->n", offset, offset)[:, None] - (offset @ direction.T) ** 2
-    on = (square <= LINE_THICK_M**2).sum(axis=0)
-    inner, outer = RING_M
-    beside = ((square > inner**2) & (square <= outer**2)).sum(axis=0)
-    best = int(np.argmax(on - beside))
-    return bool(on[best] >= LINE_POINTS and beside[best] <= LINE_BESIDE * on[best])
 
 
 def _hangs(places: np.ndarray, voxel_size: float, free_air: float) -> np.ndarray:
@@ -250,54 +289,6 @@ def _hangs(places: np.ndarray, voxel_size: float, free_air: float) -> np.ndarray
     hangs = np.empty(len(order), bool)
     hangs[order] = reached * voxel_size > free_air
     return hangs
-
-
-def _thin(places: np.ndarray, candidate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The candidates that are part of something long, thin and level.
-
-    Args:
-        places: (M, 3) m.
-        candidate: (M,) bool.
-
-    Returns:
-        positions (N, 3) m, horizontal unit vectors (N, 2) along the conductors, and their rise
-        (N,) per metre in that direction.
-    """
-    from scipy.spatial import cKDTree
-
-    n = len(places)
-    pairs = cKDTree(places).query_pairs(max(SCALES), output_type="ndarray")
-    one, other = pairs[candidate[pairs].any(axis=1)].T  # the others are in no sum of a candidate
-    offset = places[other] - places[one]
-    square = np.einsum("ni,ni->n", offset, offset)
-    thinnest = np.full(n, np.inf)
-    heading = np.zeros((n, 3))
-    for radius in SCALES:
-        pair = square <= radius**2
-        i, j, d = one[pair], other[pair], offset[pair]
-        count = 1 + np.bincount(i, minlength=n) + np.bincount(j, minlength=n)
-        rows = np.flatnonzero(candidate & (count >= MIN_VOXELS))
-        mean = np.stack([np.bincount(i, x, n) - np.bincount(j, x, n) for x in d.T], axis=1)
-        mean = (mean / count[:, None])[rows]
-        spread = np.empty((len(rows), 3, 3))
-        for a in range(3):
-            for b in range(a, 3):
-                product = d[:, a] * d[:, b]
-                total = np.bincount(i, product, n) + np.bincount(j, product, n)
-                spread[:, a, b] = (total / count)[rows] - mean[:, a] * mean[:, b]
-                spread[:, b, a] = spread[:, a, b]
-        variance, direction = np.linalg.eigh(spread)
-        along = direction[:, :, 2]
-        # A line of length l has the variance l^2 / 12; it must cover half the sphere's diameter.
-        long = variance[:, 2] * 12 >= radius**2
-        level = np.abs(along[:, 2]) <= RISE
-        share = variance[:, 1] / np.maximum(variance[:, 2], 1e-9)
-        better = long & level & (share <= THIN) & (share < thinnest[rows])
-        thinnest[rows[better]] = share[better]
-        heading[rows[better]] = along[better]
-    thin = np.isfinite(thinnest)
-    level_part = np.linalg.norm(heading[thin, :2], axis=1)
-    return places[thin], heading[thin, :2] / level_part[:, None], heading[thin, 2] / level_part
 
 
 def _runs(bearing: np.ndarray, s: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
@@ -334,10 +325,10 @@ def _angle(bearing: np.ndarray, middle: float) -> np.ndarray:
     return np.abs((bearing - middle + 180) % 360 - 180)
 
 
-def _longest_run(s: np.ndarray) -> float:
-    """m, longest stretch of the positions (M,) m without a gap over ``GAP``."""
+def _longest_run(s: np.ndarray, gap: float = GAP) -> float:
+    """m, longest stretch of the positions (M,) m without a gap over ``gap`` m."""
     if len(s) == 0:
         return 0.0
-    metres = np.unique(s.astype(int))
-    parts = np.split(metres, np.flatnonzero(np.diff(metres) > GAP) + 1)
+    metres = np.unique(np.floor(s))
+    parts = np.split(metres, np.flatnonzero(np.diff(metres) > gap) + 1)
     return float(max(part[-1] - part[0] + 1 for part in parts))

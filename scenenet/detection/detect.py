@@ -7,7 +7,6 @@ depends on how many of its voxels the model detects.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +19,7 @@ from scenenet.detection.candidates import (
     axes,
     neighbours_adjacent,
 )
-from scenenet.detection.conductors import Span, leaving_spans
+from scenenet.detection.conductors import Span, Surroundings, leaving_spans
 from scenenet.detection.settings import DetectionSettings
 
 
@@ -51,10 +50,6 @@ class DetectedTower:
     probability: float
     voxels: np.ndarray
 
-
-Surroundings = Callable[[np.ndarray, float], np.ndarray]
-"""A function of a position (2,) m and a radius in m, which returns the centres (M, 3) m of the
-occupied voxels within this radius in plan."""
 
 MIN_DISTANCE = 0.5
 """Smallest distance between two towers, as a share of the height of the first."""
@@ -177,7 +172,9 @@ def _measure(
         return None
     x, y = float(axis[0]), float(axis[1])
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
-    spans = leaving_spans(around, (x, y), body.base, body.height, crossarm, size)
+    spans = []
+    if settings.min_conductor > 0:
+        spans = leaving_spans(around, (x, y), body.base, body.height, crossarm, size)
     followed = sum(span.followed for span in spans)
     if followed < settings.min_conductor * (1 if peak >= tau else 2):
         return None

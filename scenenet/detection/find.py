@@ -7,32 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenenet.detection.candidates import SAME_M, SURROUNDINGS_M, DetectedVoxels
-from scenenet.detection.conductors import FAR
+from scenenet.detection.conductor_rules import FAR, FURTHEST_M, HEAD, WIDE, WIDEST_HEAD_M
+from scenenet.detection.conductors import ConductorPoints, Span, Surroundings
 from scenenet.detection.detect import (
     DetectedTower,
-    Surroundings,
     highest_probability,
     measured_axes,
 )
-from scenenet.detection.following import FURTHEST_M, leads_on
+from scenenet.detection.following import leads_on
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.structure import BodyTests, Structure, measure_structure
 
 LOOSE = 0.75
 """Share of the thresholds that a rough measurement in voxels has to reach."""
-
-WIDE = 1.8
-"""Reach of crossarms amid the conductors, as a multiple of ``crossarm``: the head of a window tower
-is nearly as wide as half its height."""
-
-CLEAR = 0.6
-"""Share of free levels from which a body stands clear."""
-
-CLEAR_NEEDS = 0.5
-"""Share of ``min_conductor`` that a clear body needs: vegetation seldom stands so free."""
-
-MIN_AMID = 0.5
-"""Smallest length of conductors, the sum of ``Span.followed``, amid which an axis is looked for."""
 
 MIN_FREE = 1 / 3
 """Smallest share of the levels at which the body stands free, by points."""
@@ -85,10 +72,11 @@ def find_towers(
         update={
             "min_height": LOOSE * settings.min_height,
             "min_upright": LOOSE * settings.min_upright,
-            "min_conductor": LOOSE / 2 * settings.min_conductor,
+            "min_conductor": 0.0,
             "min_free": 0.0,
         }
     )
+    conductors = ConductorPoints(points, HEAD * settings.min_height)
     found: list[MeasuredTower] = []
     rough: list[DetectedTower] = []
     for tower in measured_axes(
@@ -96,7 +84,9 @@ def find_towers(
     ):
         if all(np.hypot(tower.x - r.x, tower.y - r.y) > SAME_M for r in rough):
             rough.append(tower)
-            found += _in_points(tower, surroundings, points, offset, voxel_size, tau, settings)
+            found += _in_points(
+                tower, surroundings, points, conductors, offset, voxel_size, tau, settings
+            )
     towers = _distinct(found)
     return sorted((tower.moved(offset) for tower in towers), key=highest_probability)
 
@@ -105,6 +95,7 @@ def _in_points(
     rough: DetectedTower,
     surroundings: Surroundings,
     points: Surroundings,
+    conductors: ConductorPoints,
     offset: np.ndarray,
     voxel_size: float,
     tau: float,
@@ -121,22 +112,33 @@ def _in_points(
     tests = BodyTests(settings.min_height, settings.min_upright, MIN_FREE)
     needed = settings.min_conductor * (1 if sure else 2)
     found: list[MeasuredTower] = []
-    # Without conductors there is nothing to be amid of.
-    carries = sum(span.followed for span in rough.spans) >= max(needed, MIN_AMID)
-    for amid in (False, True) if carries else (False,):
+
+    def leaving(axis: np.ndarray, base: float, height: float, crossarm: float) -> list[Span]:
+        around = surroundings(axis + offset[:2], SURROUNDINGS_M)
+        foot = base + offset[2]
+        spans = conductors.leaving(axis + offset[:2], foot, height, crossarm, around)
+        return [replace(span, places=span.places - offset) for span in spans]
+
+    # The cheapest test first: most trees have no conductor anywhere near.
+    wide = min(settings.crossarm * WIDE * rough.height, WIDEST_HEAD_M)
+    seen = leaving(axis, rough.base, rough.height, wide) if needed else []
+    if sum(span.followed for span in seen) < needed / 2:
+        return []
+    for amid in (False, True):
         share = settings.crossarm * (WIDE if amid else 1)
-        crossarm = max(settings.eps / 2, share * rough.height)
-        shape = measure_structure(near, axis, rough.height, rough.spans, crossarm, tests, amid)
+        crossarm = min(max(settings.eps / 2, share * rough.height), WIDEST_HEAD_M)
+        shape = measure_structure(
+            near, leaving, axis, rough.base, rough.height, crossarm, tests, amid
+        )
         if shape is None:
             continue
-        enough = needed * (CLEAR_NEEDS if shape.profile.free >= CLEAR else 1)
-        if not shape.carries(enough):
+        if not shape.carries(needed):
             continue
         place = np.array([shape.x, shape.y])
         far = surroundings(place + offset[:2], FURTHEST_M + FAR) - offset
         base = shape.ground.elevation
-        spans = tuple(s for s in shape.conductors if leads_on(s, place, base, far, voxel_size))
-        if not replace(shape, spans=spans).carries(enough):
+        spans = tuple(s for s in shape.spans if leads_on(s, place, base, far, voxel_size))
+        if not replace(shape, spans=spans).carries(needed):
             continue
         if any(np.hypot(shape.x - other.x, shape.y - other.y) <= APART_M for other in found):
             continue

@@ -8,28 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenenet.detection.conductors import FAR, Span
-
-FURTHEST_M = 60.0
-"""m from the tower up to which a conductor is followed. Jibs of tower cranes are seldom longer."""
-
-STEP_M = 2.0
-"""m, length of the pieces in which it is followed."""
-
-ABOVE_GROUND_M = 2.0
-"""m above the ground; lower voxels are not on a conductor."""
-
-MISSED_M = 10.0
-"""m, largest stretch without a return. Far from the tower a conductor has fewer."""
-
-SIDE_M = 2.0
-"""m, half width and half height of the corridor around the expected place of the next piece."""
-
-SUPPORT_M = 4.0
-"""m, planar distance within which a support or the edge of the data ends a conductor."""
-
-SUPPORT = 0.6
-"""Smallest share of the levels from the ground to the conductor that a support has a voxel at."""
+from scenenet.detection.conductor_rules import (
+    ABOVE_GROUND_M,
+    FAR,
+    FURTHEST_M,
+    MISSED_M,
+    SIDE_M,
+    STEP_M,
+    SUPPORT,
+    SUPPORT_M,
+)
+from scenenet.detection.conductors import Span
 
 
 def leads_on(span: Span, axis: np.ndarray, base: float, occupied: np.ndarray, size: float) -> bool:

@@ -91,7 +91,10 @@ def fit_profile(s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float) -> P
         s, t, h: (N,) m.
         height: m, approximate height of the tower.
     """
+    # No prism that is tried, with the air around it, reaches further.
+    furthest = SHIFT_M + 3 * slim(height) + 1
     inside = (h >= SCRUB_M) & (h <= height)
+    inside &= np.maximum(np.abs(s), np.abs(t)) <= furthest
     s, t, h = s[inside], t[inside], h[inside]
     best: tuple[float, float, np.ndarray, float] | None = None
     for level in LEVELS_M:

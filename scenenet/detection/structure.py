@@ -7,11 +7,13 @@ Any point of the survey can be asked whether it lies in the shape.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenenet.detection.conductors import Span, leaving_spans, thin_share
+from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, OPPOSITE, OVER_M, POLE_M, UNDER_TOP
+from scenenet.detection.conductors import Span
 from scenenet.detection.ground import Ground, fit_ground
 from scenenet.detection.head import ARM_M, NO_HEAD, Head, find_head
 from scenenet.detection.portal import find_twin
@@ -26,20 +28,6 @@ FOOT_M = 0.5
 SCRUB_TOP_M, SCRUB_TOP = 3.0, 0.15
 """Height of the highest scrub around a foot: m, and as a share of the height of the body. Below a
 tall tower it may grow higher, because there is more clearance."""
-
-MIN_THIN = 0.5
-"""Smallest share of the points of a span that are on thin lines."""
-
-OVER_M = 1.0
-"""m above the top that the lowest conductor may pass. Over a tree it passes higher."""
-
-BESIDE_M, BESIDE = 1.5, 0.05
-"""Largest distance of the axis from the nearest conductor if all pass on one side, as on a
-flag-shaped head: m for a pole, and share of the height for a wider body. Trees beside a line are
-further away."""
-
-POLE_M = 1.2
-"""m, largest width of a pole."""
 
 BELOW_ARM = 0.08
 """Share of the height below the lowest conductor at which struts of a crossarm may start."""
@@ -60,12 +48,10 @@ UPRIGHT_M = 1.5
 TOP_GAP = 3.0
 """m without a point that end a body upwards, so that a bird above it is not its top."""
 
-OPPOSITE = 120.0
-"""degrees; two spans further apart than this are the two sides of one line."""
 
-SIZE_M = 1.0
-"""m, voxels in which conductors are followed, on a lattice that is centred on the axis: what is
-found there does not depend on where the voxels of the survey lie."""
+Leaving = Callable[[np.ndarray, float, float, float], Sequence[Span]]
+"""The conductors that leave a tower, from its axis (2,), the elevation of its foot, its height, and
+the largest distance at which a conductor passes the axis, m."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +69,7 @@ class Structure:
         apart: m, half the distance between the two bodies of a portal, which stand to the left and
             right of the axis; 0 for one body.
         upright: share of the levels of the body that have a point.
-        spans: directions in which something like conductors leaves.
+        spans: directions in which conductors leave.
     """
 
     x: float
@@ -109,26 +95,22 @@ class Structure:
         ground = replace(self.ground, elevation=self.ground.elevation + z)
         return replace(self, x=self.x + x, y=self.y + y, ground=ground)
 
-    @property
-    def conductors(self) -> tuple[Span, ...]:
-        """The spans that are thin enough for conductors."""
-        return tuple(span for span in self.spans if span.thin >= MIN_THIN)
-
     def carries(self, length: float) -> bool:
         """Whether it carries conductors of this ``length``, the sum of ``Span.followed``.
 
-        They are thin, the lowest is not above its top, and they pass the axis on both sides, or
-        close to it on one.
+        The lowest is not above its top, the highest is near it, and they pass the axis on both
+        sides, or close to it on one.
         """
         if length == 0:
             return True
-        conductors = self.conductors
-        if sum(span.followed for span in conductors) < length:
+        if sum(span.followed for span in self.spans) < length:
             return False
-        if min(span.lowest for span in conductors) > self.height + OVER_M:
+        if min(span.lowest for span in self.spans) > self.height + OVER_M:
             return False
-        sides = _sides(conductors, np.array([self.along[1], -self.along[0]]))
-        limit = BESIDE_M if self.profile.width <= POLE_M else BESIDE * self.height
+        if max(span.highest for span in self.spans) < UNDER_TOP * self.height:
+            return False
+        sides = _sides(self.spans, np.array([self.along[1], -self.along[0]]))
+        limit = BESIDE_M if 2 * self.profile.top <= POLE_M else BESIDE * self.height
         return max(min(sides), -max(sides)) <= limit
 
     def contains(self, xyz: np.ndarray) -> np.ndarray:
@@ -175,9 +157,10 @@ class BodyTests:
 
 def measure_structure(
     points: np.ndarray,
+    leaving: Leaving,
     axis: np.ndarray,
+    base: float,
     height: float,
-    spans: tuple[Span, ...],
     crossarm: float,
     tests: BodyTests,
     amid: bool,
@@ -186,37 +169,37 @@ def measure_structure(
 
     Args:
         points: (N, 3) m, within ``FAR + max(SCALES)`` of the axis in plan.
+        leaving: gives the conductors; only asked for where it matters.
         axis: (2,) m, approximate.
-        height: m above the ground, approximate.
-        spans: conductors that leave, as far as they are known.
+        base, height: m, elevation of the foot and height above it, approximate.
         crossarm: m, largest distance at which a conductor passes the axis.
         tests: what a body has to be; conductors are only looked for where it is.
         amid: whether the axis is looked for amid the conductors and not where it is thought to be.
     """
-    start = axis + _middle(spans) if amid else axis
-    first = _measure_body(points, start, _along(spans), height)
-    if first is None or not (amid or tests.passed(first)):
+    first = None if amid else _measure_body(points, axis, _along(()), height)
+    if first is None and not amid:
         return None
-    origin = np.array([first.x, first.y])
+    if first is not None:
+        if not tests.passed(first):
+            return None
+        axis, base = np.array([first.x, first.y]), first.ground.elevation
     # Few returns may leave a gap below the head, which the conductors then show.
-    top = max(first.height, SPARSE * height)
-    spans = tuple(
-        replace(span, thin=thin_share(points, span, SIZE_M))
-        for span in leaving_spans(
-            lattice_on(points, origin, SIZE_M),
-            (first.x, first.y),
-            first.ground.elevation,
-            top,
-            crossarm,
-            SIZE_M,
-        )
+    top = height if first is None else max(first.height, SPARSE * height)
+    spans = tuple(leaving(axis, base, top, crossarm))
+    # Now the direction of the line is known.
+    if amid:
+        if not spans:
+            return None
+        # From there, conductors show on both sides.
+        axis = axis + _middle(spans)
+        spans = tuple(leaving(axis, base, top, crossarm))
+    start = axis + _middle(spans) if amid else axis
+    body = _measure_body(
+        points, start, _along(spans), height if first is None else first.height + 1
     )
-    # Now the direction of the line is known from the points.
-    start = origin + _middle(spans) if amid else origin
-    body = _measure_body(points, start, _along(spans), height if amid else first.height + 1)
     if body is None or not tests.passed(body):
         return None
-    return _with_head(_with_twin(body, points), points, spans, origin)
+    return _with_head(_with_twin(body, points), points, spans, axis)
 
 
 def _measure_body(
@@ -270,7 +253,7 @@ def _with_head(
     body = replace(body, spans=spans)
     line = tuple(
         span
-        for span in body.conductors
+        for span in body.spans
         if abs(_unit(span.bearing) @ body.along) > np.cos(np.radians(45.0))
     )
     if not line:
@@ -369,16 +352,3 @@ def _top(h: np.ndarray, height: float, level: float, foot: float) -> tuple[float
     n_levels = max(int(np.ceil((top - foot) / tall)), 1)
     seen = np.unique(np.minimum(((below - foot) / tall).astype(int), n_levels - 1))
     return top, len(seen) / n_levels
-
-
-def lattice_on(points: np.ndarray, axis: np.ndarray, size: float) -> np.ndarray:
-    """(M, 3) m, centres of the occupied voxels of ``size`` m on a lattice with the axis (2,) at a
-    centre, in ascending order of x, y, z."""
-    origin = np.array([*axis, 0.0])
-    steps = np.rint((points - origin) / size).astype(np.int64)
-    low = steps.min(axis=0)
-    # One number for each voxel: sorting rows takes twenty times as long.
-    sides = steps.max(axis=0) - low + 1
-    flat = np.unique(np.ravel_multi_index((steps - low).T, sides))
-    steps = np.stack(np.unravel_index(flat, sides), axis=1) + low
-    return steps * size + origin

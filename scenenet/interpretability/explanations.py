@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from scenenet.detection.conductors import FAR
+from scenenet.detection.conductor_rules import FAR
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel

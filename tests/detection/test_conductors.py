@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.detection.conductors import FAR, NEAR, leaving_spans
+from scenenet.detection.conductor_rules import FAR, NEAR
+from scenenet.detection.conductors import leaving_spans
 
 HEIGHT = 15.0
 

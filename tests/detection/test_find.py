@@ -66,7 +66,7 @@ def test_a_mast_with_a_boom_that_ends_in_the_air_is_no_tower(tower_scene):
     assert find(np.concatenate([scene.xyz, boom]), [scene.foot]) == []
 
 
-def test_a_thick_branch_beside_the_head_is_not_listed_as_a_conductor(tower_scene):
+def test_a_thick_branch_beside_the_head_is_no_conductor(tower_scene):
     scene = tower_scene("tubular", 18.0)
     rng = np.random.default_rng(3)
     s = rng.uniform(2.5, 28, 4000)
@@ -76,7 +76,6 @@ def test_a_thick_branch_beside_the_head_is_not_listed_as_a_conductor(tower_scene
     planar = s[:, None] * heading + (away * np.cos(turn))[:, None] * across
     branch = scene.foot + np.column_stack([planar, 16.5 + away * np.sin(turn)])
     (tower,) = find(np.concatenate([scene.xyz, branch]), [scene.foot])
-    assert any(abs(span.bearing - 120) < 15 for span in tower.structure.spans)
     assert sorted(round(span.bearing) for span in tower.spans) == pytest.approx([30, 210], abs=4)
 
 

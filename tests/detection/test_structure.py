@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenenet.detection.conductors import ConductorPoints
+from scenenet.detection.detect import surroundings_in
 from scenenet.detection.structure import BodyTests, measure_structure
 
 ANY = BodyTests(9.0, 0.75, 1 / 3)
@@ -13,8 +15,13 @@ ANY = BodyTests(9.0, 0.75, 1 / 3)
 def measured(scene, height, away=(0.8, -0.7), tests=ANY, amid=False):
     axis = scene.foot[:2] + away
     near = np.hypot(*(scene.xyz[:, :2] - axis).T) <= 28
-    crossarm = max(3.0, 0.25 * height)
-    return measure_structure(scene.xyz[near], axis, height, (), crossarm, tests, amid)
+    crossarm, base = max(3.0, 0.25 * height), scene.foot[2]
+    conductors = ConductorPoints(surroundings_in(scene.xyz), 4.5)
+
+    def leaving(*where):
+        return conductors.leaving(*where, around=scene.xyz)
+
+    return measure_structure(scene.xyz[near], leaving, axis, base, height, crossarm, tests, amid)
 
 
 def points_score(shape, scene):

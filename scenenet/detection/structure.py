@@ -12,7 +12,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, OPPOSITE, OVER_M, POLE_M, UNDER_TOP
+from scenenet.detection.conductor_rules import (
+    BESIDE,
+    BESIDE_M,
+    OPPOSITE,
+    OVER_M,
+    POLE_M,
+    UNDER_TOP,
+    WINDOW_M,
+)
 from scenenet.detection.conductors import Span
 from scenenet.detection.ground import Ground, fit_ground
 from scenenet.detection.head import ARM_M, NO_HEAD, Head, find_head
@@ -109,7 +117,7 @@ class Structure:
             return False
         if max(span.highest for span in self.spans) < UNDER_TOP * self.height:
             return False
-        sides = _sides(self.spans, np.array([self.along[1], -self.along[0]]))
+        sides = _sides(self.spans, _across(self.along))
         limit = BESIDE_M if 2 * self.profile.top <= POLE_M else BESIDE * self.height
         return max(min(sides), -max(sides)) <= limit
 
@@ -193,6 +201,9 @@ def measure_structure(
         # From there, conductors show on both sides.
         axis = axis + _middle(spans)
         spans = tuple(leaving(axis, base, top, crossarm))
+        sides = _sides(spans, _across(_along(spans)))
+        if not spans or max(sides) - min(sides) < WINDOW_M:
+            return None
     start = axis + _middle(spans) if amid else axis
     body = _measure_body(
         points, start, _along(spans), height if first is None else first.height + 1
@@ -210,7 +221,7 @@ def _measure_body(
     profile = fit_profile(s, t, h, height)
     if profile is None:
         return None
-    axis = axis + profile.s * along + profile.t * np.array([along[1], -along[0]])
+    axis = axis + profile.s * along + profile.t * _across(along)
     profile = replace(profile, s=0.0, t=0.0)
     ground = fit_ground(points - [*axis, 0])
     s, t, h = _frame(points, axis, along, ground)
@@ -232,7 +243,7 @@ def _with_twin(body: Structure, points: np.ndarray) -> Structure:
     at = find_twin(s, t, h, body.profile, body.height)
     if at is None:
         return body
-    away = at / 2 * np.array([body.along[1], -body.along[0]])
+    away = at / 2 * _across(body.along)
     x, y = (axis + away).tolist()
     ground = fit_ground(points - [x, y, 0])
     top = body.height + body.ground.elevation + float(body.ground.slope @ away)
@@ -248,7 +259,7 @@ def _with_head(
         origin: (2,) m, the axis that the spans are relative to.
     """
     s, t, h = _frame(points, np.array([body.x, body.y]), body.along, body.ground)
-    across = np.array([body.along[1], -body.along[0]])
+    across = _across(body.along)
     moved = float((origin - np.array([body.x, body.y])) @ across)
     body = replace(body, spans=spans)
     line = tuple(
@@ -309,6 +320,11 @@ def _along(spans: tuple[Span, ...]) -> np.ndarray:
     return first
 
 
+def _across(along: np.ndarray) -> np.ndarray:
+    """Unit vector (2,) to the right of the line."""
+    return np.array([along[1], -along[0]])
+
+
 def _unit(bearing: float) -> np.ndarray:
     return np.array([np.sin(np.radians(bearing)), np.cos(np.radians(bearing))])
 
@@ -326,7 +342,7 @@ def _sides(spans: tuple[Span, ...], across: np.ndarray) -> list[float]:
 def _middle(spans: tuple[Span, ...]) -> np.ndarray:
     """(2,) m, from the axis to the middle of the conductors."""
     along = _along(spans)
-    across = np.array([along[1], -along[0]])
+    across = _across(along)
     sides = _sides(spans, across)
     return (min(sides) + max(sides)) / 2 * across if sides else np.zeros(2)
 

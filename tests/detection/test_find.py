@@ -105,6 +105,14 @@ def test_a_tree_under_the_conductors_is_no_tower(tower_scene):
     assert len(towers) == 1
 
 
+def test_a_tree_that_reaches_up_beside_the_conductors_is_no_tower(tower_scene):
+    trees = ((2.2, 11.0, 17.5),)
+    scene = tower_scene("tubular", 18.0, bearing=0.0, trees=trees)
+    tree = scene.foot + np.array([2.2, 11.0, 0.0])
+    (tower,) = find(scene.xyz, [scene.foot, tree], height=15.0)
+    assert (tower.x, tower.y) == pytest.approx(scene.foot[:2], abs=0.3)
+
+
 def test_below_tau_conductors_have_to_leave_in_two_directions(tower_scene):
     both = tower_scene("tubular", 18.0)
     assert len(find(both.xyz, [both.foot], probability=0.4)) == 1

@@ -104,9 +104,9 @@ further away."""
 POLE_M = 1.2
 """m, largest width of a pole."""
 
-WINDOW_M = 5.0
-"""m, smallest width of the conductors amid which an axis is looked for, as in the head of a window
-tower. Amid narrower ones is the pole itself, or a tree under the line."""
+WINDOW_M = 2.5
+"""m, smallest width of the conductors amid which an axis is looked for; the crossarm of a pole is
+hardly narrower. Amid narrower ones is a tree under the line."""
 
 OPPOSITE = 120.0
 """degrees; two spans further apart than this are the two sides of one line."""

@@ -62,6 +62,9 @@ CONTINUES_M = 3
 GAP = 3.0
 """m, largest gap along a conductor that a scanner may have missed."""
 
+HIGHEST_M = 500.0
+"""m above the ground; nothing higher is on a conductor, not even across a valley."""
+
 LINE_M = 6.0
 """m, radius in which points are tested for a line; a conductor is straight over twice this."""
 

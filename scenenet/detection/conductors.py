@@ -1,8 +1,9 @@
 """Conductors that leave a tower, which distinguish it from other tall objects.
 
 A conductor is long, thin and nearly level, hangs in free air and leads away from the head of the
-tower that carries it. The occupied voxels show all of this without labels: a treetop has its tree
-below, a roof is as wide as it is long, and no conductor leaves a street light.
+tower that carries it. Points show all of this without labels (``ConductorPoints``), and so do the
+occupied voxels of a crop (``leaving_spans``): a treetop has its tree below, a roof is as wide as it
+is long, and no conductor leaves a street light.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from scenenet.detection.conductor_rules import (
     FREE_AIR_SHARE,
     GAP,
     HEAD,
+    HIGHEST_M,
     LEVEL_M,
     LINE_CELL_M,
     LINE_M,
@@ -170,6 +172,7 @@ class ConductorPoints:
         return places[inside], directions[inside], others[beside]
 
     def _in_block(self, x: int, y: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """As ``_near``, within the block number ``x``, ``y``."""
         from scenenet.detection.lines import points_on_lines  # compiled: half a second to import
 
         middle = (np.array([x, y]) + 0.5) * BLOCK_M
@@ -177,7 +180,8 @@ class ConductorPoints:
         if len(near) == 0:
             return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3))
         ground = np.percentile(near[:, 2], GROUND)
-        near = near[near[:, 2] >= ground + self._lowest - RISE * LINE_M]
+        above = near[:, 2] - ground
+        near = near[(above >= self._lowest - RISE * LINE_M) & (above <= HIGHEST_M)]
         near = near[_one_per_cell(near, LINE_CELL_M)]
         tested = _one_per_cell(near, TESTED_CELL_M)
         inside = np.abs(near[tested, :2] - middle).max(axis=1) <= BLOCK_M / 2
@@ -254,10 +258,10 @@ def _attachments(
     """Where the conductors of a span pass the tower: least and greatest distance to the right of
     the axis, and least and greatest height, m.
 
-    Voxels that continue one another towards the tower are a conductor; treetops are not.
+    Places that continue one another towards the tower are a conductor; treetops are not.
 
     Args:
-        place: (M, 3) m, voxels of the span, relative to the foot.
+        place: (M, 3) m, places of the span, relative to the foot.
         s: (M,) m, their distances along it.
     """
     right = np.array([np.cos(np.radians(bearing)), -np.sin(np.radians(bearing))])

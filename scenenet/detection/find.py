@@ -38,6 +38,25 @@ class MeasuredTower(DetectedTower):
 
     structure: Structure
 
+    @classmethod
+    def of(
+        cls, rough: DetectedTower, structure: Structure, spans: tuple[Span, ...]
+    ) -> MeasuredTower:
+        """A tower that was found at a rough one, with the conductors that lead on."""
+        return cls(
+            x=structure.x,
+            y=structure.y,
+            base=structure.ground.elevation,
+            height=structure.height,
+            width=structure.profile.width,
+            free=structure.profile.free,
+            upright=structure.upright,
+            spans=spans,
+            probability=rough.probability,
+            voxels=rough.voxels,
+            structure=structure,
+        )
+
     def moved(self, offset: np.ndarray) -> MeasuredTower:
         """The same tower elsewhere; ``offset`` is (3,) m."""
         x, y, z = offset.tolist()
@@ -130,9 +149,7 @@ def _in_points(
         shape = measure_structure(
             near, leaving, axis, rough.base, rough.height, crossarm, tests, amid
         )
-        if shape is None:
-            continue
-        if not shape.carries(needed):
+        if shape is None or not shape.carries(needed):
             continue
         place = np.array([shape.x, shape.y])
         far = surroundings(place + offset[:2], FURTHEST_M + FAR) - offset
@@ -140,23 +157,8 @@ def _in_points(
         spans = tuple(s for s in shape.spans if leads_on(s, place, base, far, voxel_size))
         if not replace(shape, spans=spans).carries(needed):
             continue
-        if any(np.hypot(shape.x - other.x, shape.y - other.y) <= APART_M for other in found):
-            continue
-        found.append(
-            MeasuredTower(
-                x=shape.x,
-                y=shape.y,
-                base=base,
-                height=shape.height,
-                width=shape.profile.width,
-                free=shape.profile.free,
-                upright=shape.upright,
-                spans=spans,
-                probability=rough.probability,
-                voxels=rough.voxels,
-                structure=shape,
-            )
-        )
+        if all(np.hypot(shape.x - other.x, shape.y - other.y) > APART_M for other in found):
+            found.append(MeasuredTower.of(rough, shape, spans))
     return found
 
 

@@ -6,6 +6,8 @@ conductor hangs in air. The points say so at any density, above trees and betwee
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
@@ -19,6 +21,26 @@ from scenenet.detection.conductor_rules import (
     RISE,
 )
 
+
+class Line(NamedTuple):
+    """What a line is, as ``scenenet.detection.conductor_rules`` says.
+
+    It is an argument of the compiled functions: a constant of another module would stay in their
+    machine code on disk when that module changes.
+    """
+
+    reach: float
+    thick: float
+    inner: float
+    outer: float
+    beside: float
+    pieces: int
+    rise: float
+
+
+LINE = Line(LINE_M, LINE_THICK_M, *RING_M, LINE_BESIDE, LINE_PIECES, RISE)
+"""The line that conductors are."""
+
 CELL_M = 1.0
 """m, cells in which neighbours are looked up."""
 
@@ -29,9 +51,9 @@ line at ``LINE_M``."""
 TRIED = 4
 """Number of directions that are measured at each point, those with most neighbours first."""
 
-
 SAMPLE = 2000
-"""Points that are tested first. A forest without conductors has no line at any of them."""
+"""Points that are tested first where there are many. A forest without conductors has no line at any
+of them."""
 
 PARALLEL = 10.0
 """degrees, largest difference between the directions that a line has at its points."""
@@ -39,6 +61,8 @@ PARALLEL = 10.0
 
 def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The tested points that lie on a thin, nearly level line.
+
+    Memory grows with the volume of the bounding box of the points, 8 bytes for each m3.
 
     Args:
         points: (N, 3) m.
@@ -54,9 +78,9 @@ def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray,
     number = np.ravel_multi_index(tuple(cells.T), tuple(shape))
     order = np.argsort(number, kind="stable")
     starts = np.searchsorted(number[order], np.arange(int(shape.prod()) + 1))
-    grid = cells, shape, order, starts
-    sample = tested[:: max(1, len(tested) // SAMPLE)]
-    if not _on_lines(points, sample, *grid)[0].any():
+    grid = cells, shape, order, starts, LINE
+    step = len(tested) // SAMPLE
+    if step > 1 and not _on_lines(points, tested[::step], *grid)[0].any():
         return np.empty(0, np.int64), np.empty((0, 3))
     on_line, direction = _on_lines(points, tested, *grid)
     rows, direction = tested[on_line], direction[on_line]
@@ -84,7 +108,10 @@ def _continued(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 @numba.njit(**COMPILED)
-def _on_lines(points, tested, cells, shape, order, starts):  # pragma: no cover - compiled
+def _on_lines(points, tested, cells, shape, order, starts, line):  # pragma: no cover - compiled
+    """Whether each of the rows ``tested`` (M,) is on a line, (M,) bool, and unit vectors (M, 3)
+    along the best lines tried. ``cells`` (N, 3) is the cell of each point in a grid of ``shape``;
+    ``order`` has the rows of each cell one after another, from ``starts`` on."""
     found = np.zeros(len(tested), np.bool_)
     direction = np.zeros((len(tested), 3))
     near = np.empty((len(points), 4))
@@ -92,10 +119,10 @@ def _on_lines(points, tested, cells, shape, order, starts):  # pragma: no cover 
     towards = np.empty((AZIMUTHS * SLOPES, 3))
     u, middle = np.empty(3), np.empty(3)
     for row in range(len(tested)):
-        if _in_crown(points, tested[row], cells, shape, order, starts):
+        if _in_crown(points, tested[row], cells, shape, order, starts, line):
             continue
-        n = _neighbours(points, tested[row], cells, shape, order, starts, near)
-        _vote(near[:n], votes, towards)
+        n = _neighbours(points, tested[row], cells, shape, order, starts, line, near)
+        _vote(near[:n], line, votes, towards)
         best = 0
         for _ in range(TRIED):
             most = np.argmax(votes)
@@ -103,34 +130,37 @@ def _on_lines(points, tested, cells, shape, order, starts):  # pragma: no cover 
                 break
             votes[most] = 0
             u[:] = towards[most]
-            _fit(near[:n], u, middle)
-            on = _pieces_on_line(near[:n], u, middle)
+            _fit(near[:n], line, u, middle)
+            on = _pieces_on_line(near[:n], line, u, middle)
             if on > best:
                 best = on
                 direction[row] = u
-        found[row] = best >= LINE_PIECES
+        found[row] = best >= line.pieces
     return found, direction
 
 
 @numba.njit(**COMPILED)
-def _neighbours(points, i, cells, shape, order, starts, near):  # pragma: no cover - compiled
+def _neighbours(points, i, cells, shape, order, starts, line, near):  # pragma: no cover - compiled
     """Write the offsets of the neighbours of point ``i`` that may lie on a line through it, or
     beside one, and their squared lengths, into ``near`` (N, 4); returns their number."""
     n = 0
     x, y, z = points[i]
-    steps = int(np.ceil(LINE_M / CELL_M))
+    steps = int(np.ceil(line.reach / CELL_M))
     for a in range(max(cells[i, 0] - steps, 0), min(cells[i, 0] + steps + 1, shape[0])):
         for b in range(max(cells[i, 1] - steps, 0), min(cells[i, 1] + steps + 1, shape[1])):
             column = (a * shape[1] + b) * shape[2]
             far = (np.hypot(a - cells[i, 0], b - cells[i, 1]) + 1.5) * CELL_M
-            high = int((RISE * far + RING_M[1]) / CELL_M) + 1
+            high = int((line.rise * far + line.outer) / CELL_M) + 1
             first = column + max(cells[i, 2] - high, 0)
             last = column + min(cells[i, 2] + high + 1, shape[2])
             for k in range(starts[first], starts[last]):
                 j = order[k]
                 dx, dy, dz = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
                 planar = dx * dx + dy * dy
-                if planar > LINE_M * LINE_M or abs(dz) > RISE * np.sqrt(planar) + RING_M[1]:
+                if (
+                    planar > line.reach * line.reach
+                    or abs(dz) > line.rise * np.sqrt(planar) + line.outer
+                ):
                     continue
                 near[n, 0], near[n, 1], near[n, 2], near[n, 3] = dx, dy, dz, planar + dz * dz
                 n += 1
@@ -138,7 +168,7 @@ def _neighbours(points, i, cells, shape, order, starts, near):  # pragma: no cov
 
 
 @numba.njit(**COMPILED)
-def _in_crown(points, i, cells, shape, order, starts):  # pragma: no cover - compiled
+def _in_crown(points, i, cells, shape, order, starts, line):  # pragma: no cover - compiled
     """Whether the nearest neighbours of point ``i`` are not on one line. Most points of a crown are
     excluded by it, at a small cost."""
     n = 0
@@ -154,13 +184,13 @@ def _in_crown(points, i, cells, shape, order, starts):  # pragma: no cover - com
                 for axis in range(3):
                     offset[axis] = points[order[k], axis] - points[i, axis]
                     square += offset[axis] * offset[axis]
-                if square <= RING_M[1] ** 2:
+                if square <= line.outer**2:
                     n += 1
                     for axis in range(3):
                         total[axis] += offset[axis]
                         for other in range(3):
                             product[axis, other] += offset[axis] * offset[other]
-    if n < LINE_PIECES:
+    if n < line.pieces:
         return False
     trace = 0.0
     for axis in range(3):
@@ -173,11 +203,11 @@ def _in_crown(points, i, cells, shape, order, starts):  # pragma: no cover - com
         power = power @ power
         power /= max(power[0, 0] + power[1, 1] + power[2, 2], 1e-300)
     along = (power * product).sum()
-    return trace - along > LINE_THICK_M**2
+    return trace - along > line.thick**2
 
 
 @numba.njit(**COMPILED)
-def _vote(near, votes, towards):  # pragma: no cover - compiled
+def _vote(near, line, votes, towards):  # pragma: no cover - compiled
     """Count the neighbours in each direction into ``votes`` (D,), and sum their offsets into
     ``towards`` (D, 3)."""
     votes[:] = 0
@@ -185,13 +215,13 @@ def _vote(near, votes, towards):  # pragma: no cover - compiled
     for k in range(len(near)):
         x, y, z = near[k, 0], near[k, 1], near[k, 2]
         planar = np.sqrt(x * x + y * y)
-        if planar <= LINE_M / 4 or abs(z) >= RISE * planar:
+        if planar <= line.reach / 4 or abs(z) >= line.rise * planar:
             continue
         if y < 0:
             x, y, z = -x, -y, -z
         # On a square instead of a circle: an arc tangent would take most of the time.
         azimuth = min(int((1 - x / (abs(x) + y)) / 2 * AZIMUTHS), AZIMUTHS - 1)
-        slope = int((z / (RISE * planar) + 1) / 2 * SLOPES)
+        slope = int((z / (line.rise * planar) + 1) / 2 * SLOPES)
         way = azimuth * SLOPES + slope
         votes[way] += 1
         towards[way, 0] += x
@@ -200,7 +230,7 @@ def _vote(near, votes, towards):  # pragma: no cover - compiled
 
 
 @numba.njit(**COMPILED)
-def _fit(near, u, middle):  # pragma: no cover - compiled
+def _fit(near, line, u, middle):  # pragma: no cover - compiled
     """Turn ``u`` (3,) into the direction of the points around its line, and write their middle,
     relative to the point at the origin, into ``middle`` (3,): the point may be on one conductor of
     a bundle. ``u`` becomes a unit vector."""
@@ -213,7 +243,7 @@ def _fit(near, u, middle):  # pragma: no cover - compiled
         n = 0
         for k in range(len(near)):
             along = near[k, 0] * a + near[k, 1] * b + near[k, 2] * c
-            if near[k, 3] - along * along <= RING_M[0] ** 2:
+            if near[k, 3] - along * along <= line.inner**2:
                 n += 1
                 x += near[k, 0] - along * a
                 y += near[k, 1] - along * b
@@ -226,20 +256,20 @@ def _fit(near, u, middle):  # pragma: no cover - compiled
 
 
 @numba.njit(**COMPILED)
-def _pieces_on_line(near, u, middle):  # pragma: no cover - compiled
+def _pieces_on_line(near, line, u, middle):  # pragma: no cover - compiled
     """Number of pieces of 1 m along ``u`` (3,) that have a point; 0 with points beside the line."""
-    if (middle * middle).sum() > LINE_THICK_M**2:
+    if (middle * middle).sum() > line.thick**2:
         return 0
-    longest = np.ceil(np.sqrt(1 + RISE * RISE) * LINE_M) + 2
+    longest = np.ceil(np.sqrt(1 + line.rise * line.rise) * line.reach) + 2
     pieces = np.zeros(2 * int(longest) + 1, np.bool_)
     on = beside = 0
     for k in range(len(near)):
         x, y, z = near[k, 0] - middle[0], near[k, 1] - middle[1], near[k, 2] - middle[2]
         along = x * u[0] + y * u[1] + z * u[2]
         square = x * x + y * y + z * z - along * along
-        if square <= LINE_THICK_M**2:
+        if square <= line.thick**2:
             on += 1
             pieces[int(np.floor(along + longest + 0.5))] = True
-        elif RING_M[0] ** 2 < square <= RING_M[1] ** 2:
+        elif line.inner**2 < square <= line.outer**2:
             beside += 1
-    return pieces.sum() if beside <= LINE_BESIDE * on else 0
+    return pieces.sum() if beside <= line.beside * on else 0

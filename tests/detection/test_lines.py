@@ -125,6 +125,12 @@ def test_points_on_a_line_get_its_direction():
     assert len(rows) - n <= 20
 
 
+@pytest.mark.parametrize("z", [1e9, -1e9])
+def test_a_stray_point_far_above_or_below_takes_no_memory(z):
+    (span,) = spans(conductor(1.5, 17), np.array([[*AXIS, z]]))
+    assert span.followed == 1
+
+
 def test_without_points_there_is_no_line():
     rows, direction = points_on_lines(np.empty((0, 3)), np.empty(0, np.int64))
     assert len(rows) == 0

@@ -17,7 +17,9 @@ from scenenet.evaluation.result import Evaluation
 from scenenet.interpretability.result import ModelCertificate
 from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.settings import BOOSTED_TREES
+from scenenet.pointcloud.quality.report import SurveyReport
 from scenenet.prediction.summary import PredictionSummary
+from scenenet.results.interactive_crop import InteractiveCrop
 from scenenet.training.tuning_result import Tuning
 
 if TYPE_CHECKING:
@@ -179,9 +181,10 @@ class Results:
             model_files=self._files("models", model, f"seed-{seed}"),
         )
 
-    def scene(self, rank: str) -> Mapping[str, Any] | None:
+    def interactive_crop(self, rank: str) -> InteractiveCrop | None:
         """The best, median or worst test crop as voxels; None if there is none."""
-        return self._if_there("interactive_crop", f"{rank}.json")
+        path = self.folder / "interactive_crop" / f"{rank}.json"
+        return read_typed(path, InteractiveCrop.from_json) if path.exists() else None
 
     def certificate(self, model: str) -> ModelCertificate | None:
         """Which properties of a GENEO a model has; None if that was not verified."""
@@ -234,10 +237,12 @@ class Results:
         files = self._files("models", ".", model)
         return files[0] if files else None
 
-    def checks(self) -> dict[str, Mapping[str, Any]]:
+    def checks(self) -> dict[str, SurveyReport]:
         """The check report of each survey, including those that are only classified."""
         surveys = dict.fromkeys([*self.surveys, *self.predicted])
-        return self._each(surveys, "check", "report.json", read_result)
+        return self._each(
+            surveys, "check", "report.json", lambda path: read_typed(path, SurveyReport.from_json)
+        )
 
     def class_counts(self) -> dict[str, pd.DataFrame]:
         """Points of each class (code, class, points, share_percent) of each survey."""

@@ -13,9 +13,10 @@ import torch
 from fixtures.scenes import make_scene
 
 from scenenet.convolution.coarsening import coarsened
+from scenenet.core.errors import InputError
 from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
-from scenenet.figures.interactive_crop import CLASSES, PALETTE, _shares, write_scene
+from scenenet.figures.interactive_crop import CLASSES, PALETTE, _shares, write_interactive_crop
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.report import page
@@ -28,7 +29,7 @@ def decoded(text: str, kind: str) -> np.ndarray:
 
 @pytest.fixture
 def scene(results: Results, tmp_path: Path) -> dict:
-    write_scene(results, "scenenet", "median", tmp_path / "median.json")
+    write_interactive_crop(results, "scenenet", "median", tmp_path / "median.json")
     return json.loads((tmp_path / "median.json").read_text())
 
 
@@ -73,8 +74,22 @@ def test_the_shares_in_a_fine_grid_are_those_of_the_blocks_that_the_model_observ
     coarse = VoxelSample("blocks", grid, blocks.index.astype(np.int32), ones, ones > 1)
     of_blocks, of_voxels = (_shares(model, sample, "presence") for sample in (coarse, fine))
     for name in ("cylinder", "arrow", "negative_sphere"):
-        expected = decoded(of_blocks[name], "<i1")[row]
-        np.testing.assert_array_equal(decoded(of_voxels[name], "<i1"), expected)
+        np.testing.assert_array_equal(of_voxels[name], of_blocks[name][row])
+
+
+def test_the_file_is_read_as_what_was_written(results, tmp_path):
+    file = results.folder / "interactive_crop" / "best.json"
+    written = write_interactive_crop(results, "scenenet", "best", file)
+    read = results.interactive_crop("best")
+    assert (
+        read.to_json() == json.loads(file.read_text()) == json.loads(json.dumps(written.to_json()))
+    )
+    for name in ("zyx", "voxel_class", "tower", "steps", "whole"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(written, name))
+    assert read.whole_scores == written.whole_scores
+    file.write_text(file.read_text().replace('"tau_step"', '"step"'))
+    with pytest.raises(InputError, match="another version"):
+        results.interactive_crop("best")
 
 
 def test_the_view_has_no_colours_but_those_of_the_palette():

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from scenenet.experiments.published import Thesis
-from scenenet.figures.interactive_crop import write_scene
+from scenenet.figures.interactive_crop import write_interactive_crop
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.report import write_report
 from scenenet.results.folder import Results
+from scenenet.results.interactive_crop import InteractiveCrop
 
 SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
 PHONE_PX = 390
@@ -54,9 +55,9 @@ CONTRASTS = """() => {
 
 
 @pytest.fixture
-def scene(page: Path, results: Results, thesis: Thesis) -> dict:
-    """The data of the interactive crop of the page."""
-    made = write_scene(
+def scene(page: Path, results: Results, thesis: Thesis) -> InteractiveCrop:
+    """The interactive crop of the page."""
+    made = write_interactive_crop(
         results, "scenenet", "best", results.folder / "interactive_crop" / "best.json"
     )
     write_report(results, thesis, page)
@@ -106,7 +107,7 @@ def test_every_interactive_crop_is_drawn_and_rotates_with_the_mouse(pictures, pa
 
 
 def test_the_slider_moves_tau_and_the_scores_are_those_of_the_curve(pictures, page, scene):
-    curve = ThresholdCurve(np.array(scene["true"]), np.array(scene["false"]))
+    curve = ThresholdCurve(np.array(scene.true), np.array(scene.false))
     with opened(pictures, page) as tab:
         slider, scores = (tab.locator(f"figure.scene {one}") for one in ("input", "output"))
         slider.scroll_into_view_if_needed()

@@ -8,7 +8,7 @@ def check(job: _job.Job) -> None:
     from scenenet.pointcloud.quality.check import CheckSettings, check_survey
 
     report = check_survey(job.input.survey, job.identity["codes"], CheckSettings(**job.settings))
-    write_json(job.output.report, report.to_dict())
+    write_json(job.output.report, report.to_json())
     with atomic(job.output.classes) as partial:
         report.classes.to_csv(partial, index=False)
 

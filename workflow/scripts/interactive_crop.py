@@ -6,9 +6,9 @@ from _results import results_of
 
 def interactive_crop(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.figures.interactive_crop import write_scene
+    from scenenet.figures.interactive_crop import write_interactive_crop
 
-    write_scene(
+    write_interactive_crop(
         results_of(job),
         job.identity["model"],
         job.identity["rank"],

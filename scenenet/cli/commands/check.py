@@ -41,7 +41,7 @@ def command(
         except InputError as error:
             errors.append(error)
     if as_json:
-        print(json.dumps([report.to_dict() for report in reports], indent=2))
+        print(json.dumps([report.to_json() for report in reports], indent=2))
     else:
         print("\n\n".join(report.text() for report in reports))
     for message in errors:

@@ -6,10 +6,10 @@ correspond to thesis Table 5.1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydantic import Field
@@ -22,7 +22,13 @@ from scenenet.pointcloud.las.crs import Unit
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
 from scenenet.pointcloud.quality.cell_counts import CellCounts, DuplicateCount
-from scenenet.pointcloud.quality.report import SurveyReport, about_points, class_table
+from scenenet.pointcloud.quality.report import (
+    Corner,
+    SurveyFacts,
+    SurveyReport,
+    about_points,
+    class_table,
+)
 from scenenet.pointcloud.quality.screening import Finding, Screening, of_samples
 from scenenet.pointcloud.reading import SurveyInfo, iter_chunks, survey_info
 from scenenet.pointcloud.ts40k import sample_files
@@ -221,32 +227,32 @@ def _report(
     area = None
     if n_points and not degrees:
         area = tally.planar.n_cells * (tally.planar.cell * unit) ** 2
-    facts: dict[str, Any] = {
-        "survey": info.path.name,
-        "format": info.format,
-        "version": info.version,
-        "point_format": info.point_format,
-        "n_points": n_points,
-        "mins": _finite(tally.mins),
-        "maxs": _finite(tally.maxs),
-        "header_mins": _finite(np.array(info.mins)),
-        "header_maxs": _finite(np.array(info.maxs)),
-        "area_m2": area,
-        "density_per_m2": None if not area else n_points / area,
-        "crs": None if info.crs is None else info.crs.name,
-        "epsg": None if info.crs is None else info.crs.to_epsg(),
-        "unit": "degree" if degrees else _unit_name(info.record.planar),
-        "vertical_unit": _unit_name(info.record.vertical),
-        "codes": None if scheme is None else scheme.name,
-        "extra_dimensions": list(info.extra_dimensions),
-        "duplicated_points": tally.duplicates.estimate(n_points),
-        "duplicates_estimated": tally.duplicates.is_sampled,
-        "stray_points": _count_stray(tally, settings),
-        "points_outside_header_box": tally.outside,
-        "points_without_gps_time": tally.bad_time,
-        "withheld_points": tally.withheld,
-        "impossible_returns": tally.bad_returns if tally.has_returns else 0,
-    }
+    facts = SurveyFacts(
+        survey=info.path.name,
+        format=info.format,
+        version=info.version,
+        point_format=info.point_format,
+        n_points=n_points,
+        mins=_finite(tally.mins),
+        maxs=_finite(tally.maxs),
+        header_mins=_finite(np.array(info.mins)),
+        header_maxs=_finite(np.array(info.maxs)),
+        area_m2=area,
+        density_per_m2=None if not area else n_points / area,
+        crs=None if info.crs is None else info.crs.name,
+        epsg=None if info.crs is None else info.crs.to_epsg(),
+        unit="degree" if degrees else _unit_name(info.record.planar),
+        vertical_unit=_unit_name(info.record.vertical),
+        codes=None if scheme is None else scheme.name,
+        extra_dimensions=info.extra_dimensions,
+        duplicated_points=tally.duplicates.estimate(n_points),
+        duplicates_estimated=tally.duplicates.is_sampled,
+        stray_points=_count_stray(tally, settings),
+        points_outside_header_box=tally.outside,
+        points_without_gps_time=tally.bad_time,
+        withheld_points=tally.withheld,
+        impossible_returns=tally.bad_returns if tally.has_returns else 0,
+    )
     classes = class_table(tally.counts, scheme)
     warnings = [finding.text for finding in findings]
     return SurveyReport(facts, classes, tuple(warnings + about_points(facts)))
@@ -269,20 +275,25 @@ def _together(
     counts = np.zeros(256, np.int64)
     for report in reports:
         counts[report.classes["code"].to_numpy(int)] += report.classes["points"].to_numpy(int)
-    facts = {**each[0], "survey": folder.name, "samples": len(each)}
-    facts |= {name: sum(one[name] for one in each) for name in SUMMED}
-    facts["duplicates_estimated"] = any(one["duplicates_estimated"] for one in each)
-    for ends, of_both in (("mins", np.min), ("maxs", np.max)):
-        for name in (ends, f"header_{ends}"):
-            known = [one[name] for one in each if one[name] is not None]
-            facts[name] = of_both(known, axis=0).tolist() if known else None
-    areas = [one["area_m2"] for one in each if one["area_m2"]]
-    facts["area_m2"] = sum(areas) if areas else None
-    facts["density_per_m2"] = facts["n_points"] / facts["area_m2"] if areas else None
-    by_sample = {report.facts["survey"]: findings for report, findings in checked}
+    sums = {name: sum(getattr(one, name) for one in each) for name in SUMMED}
+    area = sum(one.area_m2 for one in each if one.area_m2) or None
+    facts = replace(
+        each[0],
+        **sums,
+        survey=folder.name,
+        samples=len(each),
+        duplicates_estimated=any(one.duplicates_estimated for one in each),
+        mins=_outermost(min, [one.mins for one in each]),
+        maxs=_outermost(max, [one.maxs for one in each]),
+        header_mins=_outermost(min, [one.header_mins for one in each]),
+        header_maxs=_outermost(max, [one.header_maxs for one in each]),
+        area_m2=area,
+        density_per_m2=None if area is None else sums["n_points"] / area,
+    )
+    by_sample = {report.facts.survey: findings for report, findings in checked}
     warnings = of_samples(by_sample, counts, scheme) + about_points(facts)
     if scheme is not None and any(counts[code] for code in scheme.tower):
-        without = [report.facts["survey"] for report in reports if not _has_tower(report, scheme)]
+        without = [report.facts.survey for report in reports if not _has_tower(report, scheme)]
         if without:
             listed = ", ".join(without[:5]) + (" and more" if len(without) > 5 else "")
             warnings.append(
@@ -296,8 +307,18 @@ def _has_tower(report: SurveyReport, scheme: ClassScheme) -> bool:
     return bool(classes.loc[classes["code"].isin(scheme.tower), "points"].sum())
 
 
-def _finite(values: np.ndarray) -> list[float] | None:
-    return values.tolist() if np.isfinite(values).all() else None
+def _outermost(of: Callable[..., float], corners: Sequence[Corner | None]) -> Corner | None:
+    """The smallest or largest x, y and z of the known corners."""
+    known = [corner for corner in corners if corner is not None]
+    if not known:
+        return None
+    x, y, z = (of(values) for values in zip(*known, strict=True))
+    return x, y, z
+
+
+def _finite(corner: np.ndarray) -> Corner | None:
+    x, y, z = corner.tolist()
+    return (x, y, z) if np.isfinite(corner).all() else None
 
 
 def _unit_name(unit: Unit | None) -> str | None:

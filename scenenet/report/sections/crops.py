@@ -42,35 +42,33 @@ def _scenes(context: ReportContext) -> list[Block]:
     """The interactive crops (thesis Figures 5.6, 5.8, 5.9)."""
     made: list[Block] = []
     for rank in CROP_RANKS:
-        data = context.results.scene(rank)
-        if data is None:
+        crop = context.results.interactive_crop(rank)
+        if crop is None:
             continue
-        geneos = [
-            (name, f"contribution of the {name.replace('_', ' ')}") for name in data["shares"]
-        ]
+        geneos = [(name, f"contribution of the {name.replace('_', ' ')}") for name in crop.shares]
         kinds = [
             ("found", "voxels at or above tau"),
             ("whole", "whole towers"),
             ("class", "class"),
             ("probability", "probability"),
         ]
-        whole = data["whole_scores"]
-        n = len(data["true"])
+        whole = crop.whole_scores
+        n = len(crop.true)
         made.append(
             Scene(
                 rank,
                 f"The {rank} test crop in 3D",
-                f"Crop {data['crop']} in voxels of {data['voxel_size']:.2f} m, predicted by "
-                f"{data['model']} (seed {data['seed']}). Drag to rotate, or use the arrow keys, + "
+                f"Crop {crop.crop} in voxels of {crop.voxel_size:.2f} m, predicted by "
+                f"{crop.model} (seed {crop.seed}). Drag to rotate, or use the arrow keys, + "
                 "and -. Green: true positive; orange: false positive; pink: false negative. "
                 "Contributions are red where a GENEO raises the output and blue where it lowers "
                 "it. "
                 f"Scores count all voxels of the grid; the slider has {n - 1} thresholds. Whole "
-                f"towers at the tau of the model: precision {score_text(whole['precision'], 3)}, "
-                f"recall {score_text(whole['recall'], 3)}, F0.5 {score_text(whole['f05'], 3)}.",
-                f"The occupied voxels of crop {data['crop']} in space.",
+                f"towers at the tau of the model: precision {score_text(whole.precision, 3)}, "
+                f"recall {score_text(whole.recall, 3)}, F0.5 {score_text(whole.f05, 3)}.",
+                f"The occupied voxels of crop {crop.crop} in space.",
                 [*kinds, *geneos],
-                {**data, "palette": PALETTE},
+                {**crop.to_json(), "palette": PALETTE},
             )
         )
     return made

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import pandas as pd
 
+from scenenet.pointcloud.quality.report import SurveyReport
 from scenenet.report.blocks import Block, Column, Notes, Section, Table, table
 from scenenet.report.context import ReportContext
 
@@ -16,8 +16,8 @@ def data(context: ReportContext) -> Section | None:
     checks = context.results.checks()
     blocks: list[Block] = [_survey_list(checks)] if checks else []
     for survey, report in checks.items():
-        if warnings := [_warning(item) for item in report.get("warnings", [])]:
-            blocks.append(Notes(f"Warnings of the check of {survey}", warnings))
+        if report.warnings:
+            blocks.append(Notes(f"Warnings of the check of {survey}", report.warnings))
     classes = context.table("classes")
     if classes is not None:
         columns = [
@@ -91,7 +91,7 @@ def voxels(context: ReportContext) -> Section | None:
     return Section("voxels", "Voxels", blocks) if blocks else None
 
 
-def _survey_list(checks: Mapping[str, Mapping[str, Any]]) -> Table:
+def _survey_list(checks: Mapping[str, SurveyReport]) -> Table:
     columns = [
         Column("survey", "survey"),
         Column("n_points", "points", "count"),
@@ -100,7 +100,7 @@ def _survey_list(checks: Mapping[str, Mapping[str, Any]]) -> Table:
         Column("crs", "CRS"),
         Column("codes", "class codes"),
     ]
-    facts = [{"survey": name} | {c.name: report.get(c.name) for c in columns[1:]}
+    facts = [{"survey": name} | {c.name: getattr(report.facts, c.name) for c in columns[1:]}
              for name, report in checks.items()]  # fmt: skip
     frame = pd.DataFrame(facts).fillna({"crs": "none", "codes": "not given"})
     return table(
@@ -108,10 +108,6 @@ def _survey_list(checks: Mapping[str, Mapping[str, Any]]) -> Table:
         columns,
         "Every survey of the run: training data and surveys that are only classified.",
     )
-
-
-def _warning(item: str | Mapping[str, str]) -> str:
-    return item if isinstance(item, str) else str(item.get("message", dict(item)))
 
 
 def _listed(names: Sequence[str]) -> str:

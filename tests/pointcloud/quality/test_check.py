@@ -6,6 +6,7 @@ import json
 import struct
 
 import numpy as np
+import pandas as pd
 import pyproj
 import pytest
 import torch
@@ -14,6 +15,7 @@ from scenenet.core.errors import InputError
 from scenenet.pointcloud import PointCloud, write_las
 from scenenet.pointcloud.quality.cell_counts import CellCounts, DuplicateCount
 from scenenet.pointcloud.quality.check import CheckSettings, check_survey
+from scenenet.pointcloud.quality.report import SurveyReport
 
 UTM = pyproj.CRS.from_epsg(32629)
 
@@ -38,7 +40,7 @@ def grid_survey(tmp_path):
 
 def test_counts_density_and_extent(grid_survey):
     report = check_survey(grid_survey(), "edp")
-    facts = report.to_dict()
+    facts = report.to_json()
     assert facts["n_points"] == 800
     assert facts["area_m2"] == 800
     assert facts["density_per_m2"] == 1
@@ -61,13 +63,16 @@ def test_class_densities_are_percent_of_all_points_as_in_table_5_1(grid_survey):
 
 def test_the_report_is_json_and_a_table(grid_survey):
     report = check_survey(grid_survey(), "edp")
-    data = json.loads(json.dumps(report.to_dict(), allow_nan=False))
+    data = json.loads(json.dumps(report.to_json(), allow_nan=False))
     assert {
         "code": 15,
         "class": "Power line support tower",
         "points": 10,
         "share_percent": 1.25,
     } in (data["classes"])
+    read = SurveyReport.from_json(data)
+    assert (read.facts, read.warnings) == (report.facts, report.warnings)
+    pd.testing.assert_frame_equal(read.classes, report.classes)
     for word in ("800", "Power line support tower", "EPSG:32629", "1.250"):
         assert word in report.text()
 
@@ -96,7 +101,7 @@ def test_degrees_are_reported_and_give_no_density(tmp_path):
     write_las(path, PointCloud(xyz, np.full(200, 2, np.uint8)), scale=1e-7)
     report = check_survey(path, "edp")
     assert any("degrees" in warning for warning in report.warnings)
-    assert report.to_dict()["density_per_m2"] is None
+    assert report.to_json()["density_per_m2"] is None
 
 
 def test_without_a_scheme_codes_stay_numbers_and_mean_nothing(grid_survey):
@@ -121,13 +126,14 @@ def test_the_samples_of_a_folder_are_checked_together(tmp_path):
     points = report.classes.set_index("code")["points"]
     assert (points[2], points[15], points.sum()) == (500, 100, 600)
     assert report.classes.set_index("code").loc[15, "share_percent"] == pytest.approx(100 / 6)
-    facts = report.to_dict()
+    facts = report.to_json()
     assert (facts["survey"], facts["samples"], facts["n_points"]) == ("samples", 2, 600)
-    assert facts["area_m2"] == sum(one.facts["area_m2"] for one in single)
+    assert facts["area_m2"] == sum(one.facts.area_m2 for one in single)
     assert facts["mins"][0] < 1 and facts["maxs"][0] > 109
     assert "no point is labelled tower in 1 of 2 samples: b.npy" in report.warnings
     assert "samples: NPY" in report.text()
     assert json.loads(json.dumps(facts)) == facts
+    assert SurveyReport.from_json(facts).facts == report.facts
 
 
 def test_a_folder_without_samples_is_refused(tmp_path):
@@ -152,7 +158,7 @@ def test_times_that_are_not_numbers_and_withheld_points_are_counted(
     at = header_end + (20 if point_format < 6 else 22)
     flags = {header_end + 15: bytes([0x80 | 2 if point_format < 6 else 0x04])}
     odd = patched(path, {at: struct.pack("<d", np.nan)} | flags)
-    facts = check_survey(odd, "edp").to_dict()
+    facts = check_survey(odd, "edp").to_json()
     assert facts["points_without_gps_time"] == 1
     assert facts["withheld_points"] == 1
 
@@ -161,15 +167,15 @@ def test_an_empty_survey_has_a_report(tmp_path):
     path = tmp_path / "empty.laz"
     write_las(path, PointCloud(np.empty((0, 3)), np.empty(0, np.uint8)))
     report = check_survey(path, "edp")
-    assert report.to_dict()["n_points"] == 0
+    assert report.to_json()["n_points"] == 0
     assert "no points" in report.warnings[0]
     assert report.text()
 
 
 def test_chunks_do_not_change_the_report(grid_survey):
     path = grid_survey()
-    whole = check_survey(path, "edp").to_dict()
-    assert check_survey(path, "edp", CheckSettings(chunk_points=7)).to_dict() == whole
+    whole = check_survey(path, "edp").to_json()
+    assert check_survey(path, "edp", CheckSettings(chunk_points=7)).to_json() == whole
 
 
 def test_a_file_that_cannot_be_read_has_no_report(tmp_path):

@@ -28,6 +28,7 @@ given has the default below. `RESULTS_DIR/config.yaml` has all settings of a run
 | file | what it is for |
 |---|---|
 | `config.yaml` | the full reproduction, on synthetic surveys |
+| `full.yaml` | chapter 5 of the thesis at its own scale, on 2823 synthetic crops |
 | `test.yaml` | the same stages in minutes |
 | `ts40k.yaml` | real samples of TS40K: `--config ts40k_dir=FOLDER` |
 | `studies.yaml` | the studies of the thesis; see `docs/guides/studies.md` |

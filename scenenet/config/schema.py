@@ -64,6 +64,11 @@ class Synthetic(Settings):
     surveys: tuple[SyntheticSurvey, ...] = Field(
         (), description="synthetic surveys that the workflow can make"
     )
+    temporary: bool = Field(
+        False,
+        description="delete the files of the synthetic surveys once their crops are cut; they are "
+        "made again when a stage has to read them",
+    )
 
 
 class Prediction(PredictSettings):
@@ -190,6 +195,14 @@ class Config(Settings):
             for name, experiment in EXPERIMENTS.items()
             if getattr(getattr(self, name), experiment.switch)
         ]
+
+    def measure_shapes(self) -> bool:
+        """Whether a model has numbers that are measured at the towers of its crops."""
+        return any(
+            model.protocol == "operational" and model.metric.numbers == "measured"
+            for model in self.models
+            if model.kind == "scenenet"
+        )
 
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)

@@ -158,7 +158,7 @@ def cut_crops(
         for crop, cloud in clouds:
             arrays = {"xyz": cloud.xyz, "classification": cloud.classification}
             writer.add(crop.id, arrays | ({} if cloud.truth is None else {"truth": cloud.truth}))
-            facts["crops"].append(_entry(crop, len(cloud)))
+            facts["crops"].append(_entry(crop, cloud))
     return facts
 
 
@@ -182,7 +182,10 @@ def crop_of(entry: dict[str, Any]) -> Crop:
     return Crop(entry["id"], entry["x"], entry["y"], entry["radius"], towers, true_towers)
 
 
-def _entry(crop: Crop, points: int) -> dict[str, Any]:
+def _entry(crop: Crop, cloud: PointCloud) -> dict[str, Any]:
+    """The entry of a crop in the manifest. ``labelled`` is the number of its points labelled tower,
+    ``wrong`` how many of these are no tower in truth, null where the truth is not known."""
+    true = cloud.is_true_tower
     return {
         "id": crop.id,
         "x": crop.x,
@@ -190,7 +193,9 @@ def _entry(crop: Crop, points: int) -> dict[str, Any]:
         "radius": crop.radius,
         "towers": _plain(crop.towers),
         "true_towers": None if crop.true_towers is None else _plain(crop.true_towers),
-        "points": points,
+        "points": len(cloud),
+        "labelled": int(cloud.is_tower.sum()),
+        "wrong": None if true is None else int((cloud.is_tower & ~true).sum()),
     }
 
 
@@ -216,8 +221,8 @@ def _cut(
             spool.touch()
         chunks = iter_chunks(path, codes, truth=None if truth is None else truth.path)
         for chunk in track(chunks, f"{survey}: chunks read"):
-            for centre, radius, spool in zip(centres, radii, spools, strict=True):
-                _append(spool, chunk, centre, radius)
+            for number in _reaching(chunk, centres, radii):
+                _append(spools[number], chunk, centres[number], radii[number])
         for number, centre, radius, spool in zip(
             towers["tower"], centres, radii, spools, strict=True
         ):
@@ -253,6 +258,15 @@ def _places(
         found.add(points)
         true_towers = found.places()
     return towers.places(), true_towers
+
+
+def _reaching(chunk: PointCloud, centres: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Numbers of the crops, with centres (C, 2) and radii (C,), that the bounding box of a chunk
+    reaches: a line has hundreds of crops, and a chunk is near a few of them."""
+    places = chunk.xyz[:, :2]
+    low, high = places.min(axis=0), places.max(axis=0)
+    reach = radii[:, None]
+    return np.flatnonzero(((centres > low - reach) & (centres < high + reach)).all(axis=1))
 
 
 def _append(spool: Path, chunk: PointCloud, centre: np.ndarray, radius: float) -> None:

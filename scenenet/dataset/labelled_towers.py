@@ -23,6 +23,9 @@ LEFT_OUT_COLUMNS = ("x", "y", "points", "height", "reason")
 """x, y: centre of the points, m. points: their number. height: top minus base, m. reason: why these
 points labelled tower are no tower."""
 
+DIRECTION_STEP = 3.0
+"""Step of the directions in which the base of a tower is measured, degrees."""
+
 
 class TowerSettings(Settings):
     """DBSCAN of the points labelled tower.
@@ -228,11 +231,7 @@ def _measure(xyz: np.ndarray) -> dict[str, float | int]:
     # Cells, not points: the side with more points must not shift the centre.
     cells = np.unique(np.floor(xyz[:, :2] * 2), axis=0) / 2 + 0.25
     x, y = np.median(cells, axis=0)
-    lower = xyz[xyz[:, 2] <= (base + top) / 2, :2]
-    centred = lower - lower.mean(axis=0)
-    axes = np.linalg.svd(centred, full_matrices=False)[2]
-    low, high = np.percentile(centred @ axes.T, [2, 98], axis=0)
-    sides = np.sort(high - low)
+    sides = np.sort(_sides(xyz[xyz[:, 2] <= (base + top) / 2, :2]))
     return {
         "x": x,
         "y": y,
@@ -243,6 +242,19 @@ def _measure(xyz: np.ndarray) -> dict[str, float | int]:
         "length": sides[-1],
         "points": len(xyz),
     }
+
+
+def _sides(xy: np.ndarray) -> np.ndarray:
+    """Sides (2,), m, of the rectangle of least area around points (n, 2), in any direction, without
+    the outer 2 % to each side. A square has no main axes, so they would be drawn across corners.
+    """
+    angles = np.radians(np.arange(0.0, 90.0, DIRECTION_STEP))
+    along = np.stack([np.cos(angles), np.sin(angles)])
+    across = np.stack([-np.sin(angles), np.cos(angles)])
+    centred = xy - xy.mean(axis=0)
+    low, high = np.percentile(np.stack([centred @ along, centred @ across]), [2, 98], axis=1)
+    sides = high - low
+    return sides[:, int(np.argmin(sides.prod(axis=0)))]
 
 
 def _tower_points(path: str | Path, codes: str) -> np.ndarray:

@@ -21,7 +21,11 @@ VOXEL_BYTES = 3
 
 
 def build(
-    crops: str | Path, settings: VoxelSettings, store: str | Path, manifest: str | Path
+    crops: str | Path,
+    settings: VoxelSettings,
+    store: str | Path,
+    manifest: str | Path,
+    shapes: bool = True,
 ) -> dict[str, Any]:
     """Voxelise every crop of a survey.
 
@@ -30,6 +34,8 @@ def build(
         settings: the grid.
         store: path of the ``.zarr.zip`` file to write.
         manifest: path of the JSON file to write, in the same folder.
+        shapes: whether to measure the shapes of the towers, which takes 50 times as long as the
+            voxels; only models with measured numbers need them.
 
     Returns:
         the manifest: ``samples`` has an entry for each crop with its grid, the numbers of occupied
@@ -57,7 +63,7 @@ def build(
             with in_file(place=f"crop {crop.id}"):
                 sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id)
             seconds = time.perf_counter() - begin
-            shape = measure_shape(crop, cloud)
+            shape = measure_shape(crop, cloud) if shapes else None
             arrays = {"index": sample.index, "count": sample.count, "tower": sample.tower}
             if sample.true is not None:
                 arrays["true"] = sample.true

@@ -18,6 +18,7 @@ import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, read_json, sha256, write_json
+from scenenet.dataset.file_steps import pack, unpack
 
 
 class StoreWriter:
@@ -29,15 +30,18 @@ class StoreWriter:
         self.count = 0
 
     def add(self, name: str, arrays: Mapping[str, np.ndarray]) -> None:
-        """Store ``arrays`` as the group ``name``."""
-        from zarr.codecs import BloscCodec
-
+        """Store ``arrays`` as the group ``name``; coordinates as steps where they are such."""
         group = self._root.create_group(name)
         for key in sorted(arrays):
             array = np.ascontiguousarray(arrays[key])
-            compressor = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
-            chunks = tuple(max(1, n) for n in array.shape)
-            group.create_array(key, data=array, chunks=chunks, compressors=compressor)
+            packed = pack(array)
+            if packed is None:
+                _write(group, key, array)
+            else:
+                parts, facts = packed
+                inner = group.create_group(key, attributes=facts)
+                for part in sorted(parts):
+                    _write(inner, part, parts[part])
             self._digest.update(f"{name}/{key}/{array.dtype.str}{array.shape}".encode())
             self._digest.update(array.tobytes())
         self.count += 1
@@ -114,4 +118,17 @@ class StoreReader:
     def get(self, name: str) -> dict[str, np.ndarray]:
         """The arrays of group ``name``."""
         group: Any = self._root[name]
-        return {key: np.asarray(array[...]) for key, array in group.arrays()}
+        found = {key: np.asarray(array[...]) for key, array in group.arrays()}
+        for key, inner in group.groups():
+            parts = {part: np.asarray(array[...]) for part, array in inner.arrays()}
+            found[key] = unpack(parts, dict(inner.attrs))
+        return found
+
+
+def _write(group: Any, key: str, array: np.ndarray) -> None:
+    """Write one array as one compressed chunk."""
+    from zarr.codecs import BloscCodec
+
+    compressor = BloscCodec(cname="zstd", clevel=5, shuffle="bitshuffle")
+    chunks = tuple(max(1, n) for n in array.shape)
+    group.create_array(key, data=array, chunks=chunks, compressors=compressor)

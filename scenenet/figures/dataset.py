@@ -82,7 +82,7 @@ def draw_surveys(results: Results, out: Path) -> tuple[str, str]:
     for survey in results.surveys:
         reader = StoreReader(results.folder / "crops" / survey / "manifest.json")
         ordered = sorted(reader.manifest["crops"], key=lambda entry: (entry["points"], entry["id"]))
-        made = (results.folder / "synthetic" / f"{survey}.laz").exists()
+        made = (results.folder / "synthetic" / f"{survey}.provenance.json").exists()
         ranks = (0.5,) if made else (0.17, 0.5, 0.83)
         chosen = {int(rank * len(ordered)): None for rank in ranks if ordered}
         for entry in (ordered[place] for place in chosen):

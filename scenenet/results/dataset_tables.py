@@ -7,6 +7,15 @@ import pandas as pd
 from scenenet.experiments.published import Thesis
 from scenenet.results.folder import Results
 
+TOWER_PROPERTIES = (
+    ("points", ""),
+    ("width", "m"),
+    ("length", "m"),
+    ("height", "m"),
+    ("spacing", "m"),
+)
+"""Columns of a table of towers (``scenenet.dataset.labelled_towers``) with their units."""
+
 
 def classes(results: Results, thesis: Thesis) -> pd.DataFrame:
     """Table 5.1: share of each class in the points of all surveys together.
@@ -49,13 +58,48 @@ def towers(results: Results, thesis: Thesis) -> pd.DataFrame:
         return pd.DataFrame(columns=columns)
     every = pd.concat(tables)
     rows = []
-    for name, unit in (("points", ""), ("width", "m"), ("length", "m"), ("height", "m"),
-                       ("spacing", "m")):  # fmt: skip
-        values = every[name].dropna()
-        ours = (len(values), values.mean(), values.std(), values.min(), values.max())
+    for name, unit in TOWER_PROPERTIES:
         published = [thesis.value(f"towers.{name}", part) for part in ("value", "low", "high")]
-        rows.append((name, unit, *ours, *published))
+        rows.append((name, unit, *_spread(every[name].dropna()), *published))
     return pd.DataFrame(rows, columns=columns)
+
+
+def dataset(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """The crops, and the true towers in them (thesis 5.1.1 to 5.1.3), one row per property.
+
+    ``value`` is the mean, that of ``crops`` their number, and that of ``wrong`` the share of all
+    points labelled tower, of which ``lowest`` and ``highest`` are those of a survey. Towers are
+    true ones, without annotation noise; table ``towers`` has the same properties of the labels.
+    """
+    columns = ["property", "unit", "counted", "value", "std", "lowest", "highest", "thesis",
+               "thesis_lowest", "thesis_highest"]  # fmt: skip
+    crops = results.crops()
+    if not any(crops.values()):
+        return pd.DataFrame(columns=columns)
+    every = pd.DataFrame([entry for entries in crops.values() for entry in entries])
+    number = len(every)
+    rows = [("crops", "", number, number, *[None] * 3, thesis.value("data.crops"), None, None)]
+    rows.append(("points of a crop", "", *_spread(every["points"]), None, None, None))
+    if "wrong" in every and every["wrong"].notna().all() and every["labelled"].sum():
+        shares = [
+            100 * sum(entry["wrong"] for entry in entries) / labelled
+            for entries in crops.values()
+            if (labelled := sum(entry["labelled"] for entry in entries))
+        ]
+        whole = 100 * every["wrong"].sum() / every["labelled"].sum()
+        rows.append(("wrong", "%", int(every["labelled"].sum()), whole, None, min(shares),
+                     max(shares), thesis.value("data.mislabelled_share"), None, None))  # fmt: skip
+    if true := list(results.true_towers().values()):
+        towers = pd.concat(true)
+        for name, unit in TOWER_PROPERTIES:
+            published = [thesis.value(f"towers.{name}", part) for part in ("value", "low", "high")]
+            rows.append((f"true {name}", unit, *_spread(towers[name].dropna()), *published))
+    return pd.DataFrame(rows, columns=columns)
+
+
+def _spread(values: pd.Series) -> tuple[float, ...]:
+    """Number, mean, standard deviation, least and greatest."""
+    return len(values), values.mean(), values.std(), values.min(), values.max()
 
 
 def voxelisation(results: Results, thesis: Thesis) -> pd.DataFrame:

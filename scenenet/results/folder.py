@@ -252,6 +252,16 @@ class Results:
         """The labelled towers of each survey, one row per tower."""
         return self._each(self.surveys, "towers", "towers.csv", read_table)
 
+    def true_towers(self) -> dict[str, pd.DataFrame]:
+        """The true towers of each survey whose truth is known."""
+        found = self._each(self.surveys, "towers", "true_towers.csv", read_table)
+        return {survey: table for survey, table in found.items() if len(table)}
+
+    def crops(self) -> dict[str, list[Mapping[str, Any]]]:
+        """The entries of the crops of each survey (``scenenet.dataset.crops``)."""
+        manifests = self._each(self.surveys, "crops", "manifest.json", read_result)
+        return {survey: manifest["crops"] for survey, manifest in manifests.items()}
+
     def grid_times(self) -> pd.DataFrame | None:
         """Time and size of every crop on the grids of the thesis
         (``scenenet.evaluation.voxelisation_time``)."""

@@ -18,7 +18,7 @@ from scenenet.experiments.published import Thesis
 from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.experiments.studies.summary import summarise
 from scenenet.metrics.score_columns import SCORES, TRUTH
-from scenenet.results.dataset_tables import classes, towers, voxelisation
+from scenenet.results.dataset_tables import classes, dataset, towers, voxelisation
 from scenenet.results.folder import Results
 from scenenet.results.model_tables import certificate, parameters, times, turns
 from scenenet.results.score_tables import (
@@ -50,6 +50,7 @@ class Table(NamedTuple):
 TABLES: Mapping[str, Table] = {
     "classes": Table("Points of each class", "data", classes),
     "towers": Table("Labelled towers", "data", towers),
+    "dataset": Table("Crops and true towers", "data", dataset),
     "voxelisation": Table("Voxelisation", "data", voxelisation, times=True),
     "models": Table("Scores of each model", "models", models),
     "seeds": Table("Scores of each seed", "models", seeds),
@@ -66,6 +67,11 @@ TABLES: Mapping[str, Table] = {
     "certificate_turns": Table("Change of the output under rotation", "learned", turns),
 }
 """Every table by the stem of its file; the workflow writes and shows all of them."""
+
+DATASET_TABLES = tuple(
+    name for name, table in TABLES.items() if table.section == "data" and not table.times
+)
+"""Stems of the tables that the surveys and crops alone decide."""
 
 COMPARISON, TIMES_COMPARISON = "thesis_and_ours", "thesis_and_ours_times"
 """Stems of the tables of ``scenenet.results.thesis_comparison``."""

@@ -152,6 +152,9 @@ class Corridor:
         truth = np.concatenate([codes for _, codes in parts])
         ends = [(index, before), (index + 1, after)]
         near = [(number, tower) for number, tower in ends if 1 <= number <= settings.towers]
+        if settings.section == 1:
+            kept = _within(xyz, [tower for _, tower in near], settings.margin)
+            xyz, truth = xyz[kept], truth[kept]
         ground = self._ground_near(near)
         labels = [
             annotate(xyz, truth, near, ground, strength, settings.seed, deepcopy(rng))
@@ -214,6 +217,12 @@ class Corridor:
         reach = 12.0 + max((np.abs(t.structure.attachments).max() for _, t in towers), default=0.0)
         x, y = ([getattr(tower, axis) for _, tower in towers] or [0.0] for axis in "xy")
         return self.terrain.raster((min(x) - reach, min(y) - reach, max(x) + reach, max(y) + reach))
+
+
+def _within(xyz: np.ndarray, towers: Sequence[Support], radius: float) -> np.ndarray:
+    """(N,) bool: which points are within a planar distance in m of one of ``towers``."""
+    apart = [np.hypot(xyz[:, 0] - tower.x, xyz[:, 1] - tower.y) for tower in towers]
+    return np.min(apart, axis=0, initial=np.inf) <= radius
 
 
 def _crs(epsg: int) -> pyproj.CRS:

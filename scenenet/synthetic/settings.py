@@ -44,6 +44,12 @@ class SyntheticSettings(Settings):
     height: tuple[Metres, Metres] = Field(
         (14.5, 20.0), description="least and greatest height of a tower above its foot, m"
     )
+    height_mean: float | None = Field(
+        None,
+        gt=0,
+        description="mean height of the towers, m, with more of them near the further limit of "
+        "height; none: all heights between the limits are equally likely",
+    )
     body_width: float | None = Field(
         None,
         gt=0,
@@ -62,6 +68,11 @@ class SyntheticSettings(Settings):
     span: float = Field(70.0, ge=30.0, le=800.0, description="mean distance between towers, m")
     span_spread: float = Field(
         8.0, ge=0.0, description="standard deviation of the distance between towers, m"
+    )
+    span_limits: tuple[Metres, Metres] | None = Field(
+        None,
+        description="least and greatest distance between towers, m; distances are then skewed "
+        "between them around span, without span_spread; none: normally distributed",
     )
     circuits: Literal[1, 2] = Field(1, description="circuits of three conductors each")
     earth_wires: Literal[0, 1, 2] = Field(0, description="earth wires at the tower tops")
@@ -94,13 +105,15 @@ class SyntheticSettings(Settings):
         4,
         ge=0,
         description="mean number of towers between two gaps in the survey, which start and end at a"
-        " tower as in the files of TS40K; 0 for no gaps",
+        " tower as in the files of TS40K; 0 for no gaps; 1 for surroundings of single towers, the "
+        "points within margin of each tower",
     )
     margin: float = Field(
         0.5,
         ge=0.1,
         le=200.0,
-        description="length of corridor beyond the last tower before a gap, m",
+        description="length of corridor beyond the last tower before a gap, m; for section 1 the "
+        "radius around a tower",
     )
 
     elevation: float = Field(250.0, description="mean elevation of the ground, m")
@@ -128,6 +141,14 @@ class SyntheticSettings(Settings):
     )
     clearing: float = Field(
         1.3, ge=0.0, description="distance from the line to which crowns are cut back, m"
+    )
+    lower_ground: Share = Field(
+        0.26, description="share of the returns from bare ground, the lower ones, with class 19"
+    )
+    key_points: Share = Field(
+        0.12,
+        description="share of the returns from the ground and from grass that may be key points "
+        "(classes 2 and 3), at most one per m^2; half of it for scrub (class 4)",
     )
     water: Share = Field(0.0, description="share of the ground that is water (class 9)")
     roads: Share = Field(0.5, description="share of the linear ways that are roads")
@@ -191,12 +212,14 @@ class SyntheticSettings(Settings):
 
     @model_validator(mode="after")
     def _consistent(self) -> Self:
-        for name in ("height", "tree_height", "flight_height"):
-            low, high = getattr(self, name)
+        for name in ("height", "tree_height", "flight_height", "span_limits"):
+            low, high = getattr(self, name) or (0, 0)
             if low > high:
                 raise ValueError(
                     f"{name}: the lower limit ({low}) is above the upper limit ({high})"
                 )
+        _require_between("height_mean", self.height_mean, "height", self.height)
+        _require_between("span", self.span, "span_limits", self.span_limits)
         for name in ("kinds", "clutter_kinds"):
             if not sum(getattr(self, name).values()) > 0:
                 raise ValueError(f"{name}: at least one kind needs a weight above 0")
@@ -207,7 +230,11 @@ class SyntheticSettings(Settings):
             )
         if self.roads + self.rails > 1:
             raise ValueError("roads and rails: their sum is above 1")
-        shortest = SHORTEST_SHARE * (self.span - 2 * self.span_spread)
+        shortest = (
+            SHORTEST_SHARE * (self.span - 2 * self.span_spread)
+            if self.span_limits is None
+            else self.span_limits[0]
+        )
         if shortest < 2 * self.half_width * math.tan(math.radians(self.bend) / 2) or shortest < 10:
             raise ValueError(
                 f"span: the shortest possible span ({shortest:.0f} m) is too short for a corridor"
@@ -219,3 +246,14 @@ class SyntheticSettings(Settings):
                 f" {shortest:.0f} m"
             )
         return self
+
+
+def _require_between(
+    name: str, mean: float | None, of: str, limits: tuple[float, float] | None
+) -> None:
+    """Refuse a mean that no distribution between the limits has."""
+    if mean is not None and limits is not None and not limits[0] < mean < limits[1]:
+        raise ValueError(
+            f"{name}: a mean of {mean:g} is not between the limits of {of}, {limits[0]:g} and "
+            f"{limits[1]:g}"
+        )

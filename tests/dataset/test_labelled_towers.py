@@ -52,6 +52,13 @@ def test_a_box_has_the_properties_it_was_generated_with(turn):
     assert np.isnan(tower["spacing"])
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.4, np.pi / 4])
+def test_a_square_base_is_as_wide_as_its_sides_and_not_as_its_diagonal(turn):
+    found = find_towers(box(0, 0, width=4.0, length=4.0, turn=turn), TowerSettings()).towers
+    assert found["width"][0] == pytest.approx(3.9, abs=0.15)
+    assert found["length"][0] == pytest.approx(3.9, abs=0.15)
+
+
 def test_the_side_with_more_points_does_not_shift_the_centre():
     even = box(0, 0, n=4000)
     one_side = box(0, 0, n=40_000, seed=1)

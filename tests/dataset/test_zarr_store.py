@@ -119,3 +119,14 @@ def test_an_empty_store_is_a_store(tmp_path):
     with create(tmp_path / "s.zarr.zip", tmp_path / "m.json", {"crops": []}):
         pass
     assert StoreReader(tmp_path / "m.json").manifest["count"] == 0
+
+
+@pytest.mark.parametrize("digits", [3, None], ids=["steps of a millimetre", "any numbers"])
+def test_coordinates_come_back_bit_for_bit_and_steps_take_less_space(tmp_path, digits):
+    low = np.array([545_000.0, 4_634_000.0, 200.0])
+    xyz = np.random.default_rng(0).uniform(low, low + 80, (20_000, 3))
+    xyz = xyz if digits is None else np.round(xyz, digits)
+    manifest = write(tmp_path, {"xyz": xyz, "code": ARRAYS["code"]})
+    assert StoreReader(manifest).get("a-0001")["xyz"].tobytes() == xyz.tobytes()
+    size = (tmp_path / "s.zarr.zip").stat().st_size
+    assert (size < 8 * len(xyz)) == (digits is not None)

@@ -9,7 +9,17 @@ from pydantic import ValidationError
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import EDP
 from scenenet.synthetic import corridor_cloud, make_corridor
-from scenenet.synthetic.codes import CONDUCTOR, ON_GROUND, TALL, TOWER, TREE
+from scenenet.synthetic.codes import (
+    BARE,
+    BARE_TOO,
+    CONDUCTOR,
+    GROUND,
+    ON_GROUND,
+    TALL,
+    TOWER,
+    TREE,
+)
+from scenenet.synthetic.scene.line import skewed
 
 
 def test_same_seed_same_points(small):
@@ -60,6 +70,44 @@ def test_ground_continues_across_the_border_of_stretches(bare):
         assert len(ground) > 100
         x, y = (ground[:, :2] - origin).T
         np.testing.assert_allclose(ground[:, 2], corridor.terrain.height(x, y), atol=1e-6)
+
+
+def test_single_towers_have_the_points_around_them_and_nothing_between(small):
+    around = {"section": 1, "margin": 14.0, "half_width": 14.0, "span": 90.0}
+    settings = small(towers=5, **around)
+    corridor = make_corridor(settings)
+    xyz = np.concatenate([stretch.xyz for stretch in corridor])
+    feet = np.array([[tower.x, tower.y] for tower in corridor.towers])
+    apart = np.linalg.norm(xyz[:, None, :2] - feet, axis=2)
+    assert apart.min(axis=1).max() <= 14
+    # Of each disc nothing is missing: as many points on either side of the tower.
+    for foot, tower in zip(feet, corridor.towers, strict=True):
+        near = xyz[np.linalg.norm(xyz[:, :2] - foot, axis=1) < 14, :2] - foot
+        azimuth = corridor.line.support(tower.id).azimuth
+        ahead = (near @ [np.cos(azimuth), np.sin(azimuth)] > 0).mean()
+        assert 0.3 < ahead < 0.7
+        assert len(near) > 0.5 * settings.density * np.pi * 14**2
+
+
+@pytest.mark.parametrize(("low", "high", "mean"), [(18, 40, 34.74), (245, 500, 300), (10, 20, 15)])
+def test_skewed_numbers_stay_between_their_limits_and_have_their_mean(low, high, mean):
+    numbers = skewed((low, high), mean, np.linspace(0, 1, 100_001))
+    assert (numbers.min(), numbers.max()) == (low, high)
+    assert numbers.mean() == pytest.approx(mean, rel=1e-3)
+
+
+def test_towers_of_a_line_have_the_statistics_of_the_settings(small):
+    settings = small(
+        towers=400, height=(18, 40), height_mean=34.74, span=300, span_limits=(245, 500),
+        catenary=5000, section=1, relief=0,
+    )  # fmt: skip
+    corridor = make_corridor(settings)
+    heights = np.array([tower.height for tower in corridor.towers])
+    spans = corridor.line.spans
+    assert heights.mean() == pytest.approx(34.74, abs=0.8)
+    assert 18 <= heights.min() < 22 and 39 < heights.max() <= 40
+    assert spans.mean() == pytest.approx(300, abs=10)
+    assert spans.min() >= 245 and spans.max() <= 500
 
 
 def test_survey_ends_at_a_tower_of_each_section(small):
@@ -188,6 +236,9 @@ def test_a_crs_without_metres_is_refused(small, epsg):
         ({"flight_height": (20.0, 10.0)}, "flight_height"),
         ({"half_width": 150.0, "bend": 60.0}, "corridor"),
         ({"section": 4, "margin": 30.0}, "margin"),
+        ({"height": (18, 40), "height_mean": 41.0}, "height_mean"),
+        ({"span_limits": (245, 500), "span": 240.0}, "span"),
+        ({"span_limits": (500, 245), "span": 300.0}, "span_limits"),
         ({"roads": 0.8, "rails": 0.4}, "rails"),
         ({"towers": 0}, "towers"),
         ({"tree_share": 0.3}, "tree_share"),
@@ -196,3 +247,14 @@ def test_a_crs_without_metres_is_refused(small, epsg):
 def test_settings_that_make_no_corridor_are_refused(small, changes, word):
     with pytest.raises(ValidationError, match=word):
         small(**changes)
+
+
+def test_shares_of_ground_classes_follow_the_settings(small):
+    def share(code, **changes):
+        _, truth, _ = corridor_cloud(small(low_vegetation=0.0, tree_cover=0.0, **changes))
+        ground = np.isin(truth, (GROUND, BARE, BARE_TOO))
+        return (truth == code).sum() / ground.sum()
+
+    assert share(BARE_TOO, lower_ground=0.15) < 0.75 * share(BARE_TOO)
+    assert share(BARE_TOO, lower_ground=0.0) < share(BARE_TOO, lower_ground=0.15)
+    assert share(GROUND, key_points=0.0) == 0 < share(GROUND)

@@ -22,6 +22,7 @@ rule towers:
     resources:
         mem_mb=3000,
         runtime=60,
+    priority: 1
     params:
         job=lambda w: job(
             "towers",
@@ -58,6 +59,7 @@ rule crops:
     resources:
         mem_mb=3000,
         runtime=120,
+    priority: 1
     params:
         job=lambda w: job(
             "crops",
@@ -93,7 +95,7 @@ rule voxels:
         mem_mb=2000,
         runtime=60,
     params:
-        job=job("voxels", SETTINGS["voxels"]),
+        job=job("voxels", SETTINGS["voxels"], shapes=settings.measure_shapes()),
     message:
         "Voxelising the crops of {wildcards.survey}"
     script:
@@ -147,3 +149,30 @@ rule voxelisation_time:
         "Timing the voxelisation of the crops"
     script:
         "../scripts/voxelisation_time.py"
+
+
+rule dataset_tables:
+    input:
+        checks=every("check", "classes", survey=TRAIN),
+        towers=[*every("towers", "towers"), *every("towers", "true_towers")],
+        crops=every("crops", "manifest"),
+        thesis=ancient(own_file(settings.thesis)),
+    output:
+        tables=[table_in_report(f"{R}/tables/{name}.csv") for name in DATASET_TABLES],
+        provenance=f"{R}/dataset/provenance.json",
+    log:
+        f"{R}/logs/dataset_tables.log",
+    benchmark:
+        f"{R}/benchmarks/dataset_tables.tsv"
+    conda:
+        "../envs/scenenet.yaml"
+    threads: 1
+    resources:
+        mem_mb=1000,
+        runtime=10,
+    params:
+        job=job("dataset_tables", {}, results=results_of(models=[]), input=THESIS),
+    message:
+        "Writing the statistics of the dataset"
+    script:
+        "../scripts/dataset_tables.py"

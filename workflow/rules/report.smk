@@ -31,7 +31,11 @@ rule resolved_config:
 rule report:
     input:
         crops=every("interactive_crop", "crop"),
-        tables=[*every("tables", "tables"), *every("tables", "comparisons")],
+        tables=[
+            *every("dataset_tables", "tables"),
+            *every("tables", "tables"),
+            *every("tables", "comparisons"),
+        ],
         pictures=every_picture("pictures"),
         captions=every_picture("captions"),
         scores=every("evaluate", "scores"),

@@ -1,10 +1,15 @@
 """Surveys: making synthetic ones, and checking all."""
 
 
+def made_for_crops(file):
+    """A file of a synthetic survey, which is large and may be of no use after its crops are cut."""
+    return temp(file) if settings.synthetic.temporary else file
+
+
 rule synthesize:
     output:
-        survey=f"{R}/synthetic/{{synthetic}}.laz",
-        truth=f"{R}/synthetic/{{synthetic}}.truth.laz",
+        survey=made_for_crops(f"{R}/synthetic/{{synthetic}}.laz"),
+        truth=made_for_crops(f"{R}/synthetic/{{synthetic}}.truth.laz"),
         towers=f"{R}/synthetic/{{synthetic}}.towers.geojson",
         provenance=f"{R}/synthetic/{{synthetic}}.provenance.json",
     log:
@@ -47,6 +52,7 @@ rule check:
     resources:
         mem_mb=3000,
         runtime=60,
+    priority: 1
     params:
         job=lambda w: job(
             "check",

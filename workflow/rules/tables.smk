@@ -3,8 +3,10 @@
 
 rule tables:
     input:
+        dataset=every("dataset_tables", "tables"),
         checks=every("check", "classes", survey=TRAIN),
         towers=every("towers", "towers"),
+        crops=every("crops", "manifest"),
         voxelisation_time=every("voxelisation_time", "times"),
         split=every("split", "split"),
         trainings=every("train", "history"),

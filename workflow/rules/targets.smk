@@ -10,7 +10,7 @@ from snakemake.io import is_flagged
 
 from scenenet.figures import plan
 from scenenet.results.folder import Results
-from scenenet.results.tables import COMPARISON, TABLES, TIMES_COMPARISON
+from scenenet.results.tables import COMPARISON, DATASET_TABLES, TABLES, TIMES_COMPARISON
 
 
 def every(stage, output, **values):
@@ -71,8 +71,9 @@ def every_picture(output):
 
 
 def table_names():
-    """Stems of the tables of a run, apart from the comparisons with the thesis."""
-    return [*TABLES, *(f"study-{study}" for study in VALUES["study"]), *EXPERIMENTS]
+    """Stems of the tables that models decide, apart from the comparisons with the thesis."""
+    made = [name for name in TABLES if name not in DATASET_TABLES]
+    return [*made, *(f"study-{study}" for study in VALUES["study"]), *EXPERIMENTS]
 
 
 def each_seed_of(model):

@@ -9,15 +9,16 @@ def tables(job: _job.Job) -> None:
 
     from scenenet.core.files import write_json
     from scenenet.experiments.published import read_thesis
-    from scenenet.results.tables import digest_scores, write_tables
+    from scenenet.results.tables import DATASET_TABLES, TABLES, digest_scores, write_tables
     from scenenet.results.thesis_comparison import write_comparison
 
     results, thesis = results_of(job), read_thesis(job.input.thesis)
     folder = results.folder / "tables"
-    written = write_tables(results, thesis, folder)
+    made = [name for name in TABLES if name not in DATASET_TABLES]
+    written = write_tables(results, thesis, folder, made)
     comparisons = [Path(path) for path in job.output.comparisons]
     write_comparison(results, thesis, *comparisons)
-    names = [path.stem for path in (*written, *comparisons)]
+    names = [*DATASET_TABLES, *(path.stem for path in (*written, *comparisons))]
     write_json(job.output.scores, digest_scores(folder, names))
 
 

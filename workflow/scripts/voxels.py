@@ -14,6 +14,7 @@ def voxels(job: _job.Job) -> None:
             VoxelSettings(**job.settings),
             job.output.store,
             job.output.manifest,
+            shapes=job.identity["shapes"],
         )
 
 

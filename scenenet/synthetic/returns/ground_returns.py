@@ -62,14 +62,16 @@ def ground_return(scene, pulse, out, n, state):  # type: ignore[no-untyped-def]
             grown = TALL_M * draw / grass[r, c]
         kind = GRASS_KEY if grown < GRASS_M else SCRUB_KEY
         out.code[n] = LOW
-        if lot < (0.12 if kind == GRASS_KEY else 0.06) and not marked[kind, kr, kc]:
+        share = scene.key_points if kind == GRASS_KEY else 0.5 * scene.key_points
+        if lot < share and not marked[kind, kr, kc]:
             marked[kind, kr, kc] = True
             out.code[n] = GRASS if kind == GRASS_KEY else SCRUB
     else:
         grown = cover.rise[r, c]
         # Class 19 holds the lower returns of the ground.
-        out.code[n] = BARE_TOO if draw + 6.0 * error > 0.74 + 0.26 * grass[r, c] else BARE
-        if lot < 0.12 and not marked[GROUND_KEY, kr, kc]:
+        higher = 1.0 - scene.lower_ground * (1.0 - grass[r, c])
+        out.code[n] = BARE_TOO if draw + 6.0 * error > higher else BARE
+        if lot < scene.key_points and not marked[GROUND_KEY, kr, kc]:
             marked[GROUND_KEY, kr, kc] = True
             out.code[n] = GROUND
     out.xyz[n, 0], out.xyz[n, 1], out.xyz[n, 2] = pulse.x, pulse.y, pulse.z + grown + error

@@ -78,6 +78,8 @@ class Scene(NamedTuple):
         hit: probability that a step through foliage gives a return.
         depths: stray returns deep in the crowns, over their mean.
         noise: standard deviation of a position, m.
+        lower_ground: share of the returns from bare ground with the class of its lower returns.
+        key_points: share of the returns that may be key points.
     """
 
     ground: Grid
@@ -88,6 +90,8 @@ class Scene(NamedTuple):
     hit: float
     depths: float
     noise: float
+    lower_ground: float
+    key_points: float
 
 
 class Returns(NamedTuple):

@@ -133,6 +133,8 @@ class Scanner:
             hit=float(self._hit),
             depths=flight.depths,
             noise=self._settings.ranging_noise,
+            lower_ground=self._settings.lower_ground,
+            key_points=self._settings.key_points,
         )  # fmt: skip
 
 

@@ -57,7 +57,11 @@ class Line:
         self._settings = settings
         rng = stream(settings.seed, LINE)
         n = settings.towers + 2
-        heights = rng.uniform(*settings.height, size=n)
+        heights = (
+            rng.uniform(*settings.height, size=n)
+            if settings.height_mean is None
+            else skewed(settings.height, settings.height_mean, rng.random(n))
+        )
         # Sorted, so that the order of the kinds in a file does not change the line.
         names = sorted(settings.kinds)
         weights = np.array([settings.kinds[name] for name in names])
@@ -132,13 +136,16 @@ class Line:
 def _sections(
     n: int, settings: SyntheticSettings, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Number (n,) of the flight that scanned each stretch, and whether (n,) it is a gap.
+    """Number (n,) of the flight that scanned each stretch, and whether (n,) it is a gap. All are
+    where every tower is alone.
 
     The stretches before the first and after the last tower are gaps: the survey ends there.
     """
     flight, gap = np.zeros(n, int), np.zeros(n, bool)
     gap[[0, -1]] = True
     mean = settings.section or FLIGHT_TOWERS
+    if settings.section == 1:
+        return np.arange(n) // FLIGHT_TOWERS, np.ones(n, bool)
     left, number = 0, -1
     for k in range(n):
         if left == 0:
@@ -164,6 +171,17 @@ def _headings(n: int, settings: SyntheticSettings, rng: np.random.Generator) -> 
     return rng.uniform(0, 2 * np.pi) + deviation
 
 
+def skewed(limits: tuple[float, float], mean: float, draw: np.ndarray) -> np.ndarray:
+    """Numbers between two limits, with their mean there, from uniform ``draw`` in [0, 1).
+
+    It is the distribution of a power of a uniform number, seen from the limit that the mean is
+    nearer to, and uniform if the mean is in the middle.
+    """
+    low, high = limits
+    near, far = (low, high) if mean - low < high - mean else (high, low)
+    return near + (far - near) * draw ** ((far - near) / (mean - near) - 1)
+
+
 def _walk(
     headings: np.ndarray,
     heights: np.ndarray,
@@ -180,8 +198,13 @@ def _walk(
     bases[0] = terrain.height(np.zeros(1), np.zeros(1))[0]
     u = np.linspace(0.05, 1.0, 20)
     for k, heading in enumerate(headings):
-        drawn = settings.span + settings.span_spread * np.clip(rng.standard_normal(3), -2, 2)
-        lengths = np.r_[drawn, drawn[0] * np.array([0.85, 0.7, SHORTEST_SHARE])]
+        if settings.span_limits is None:
+            drawn = settings.span + settings.span_spread * np.clip(rng.standard_normal(3), -2, 2)
+            shorter = drawn[0] * np.array([0.85, 0.7, SHORTEST_SHARE])
+        else:
+            drawn = skewed(settings.span_limits, settings.span, rng.random(3))
+            shorter = np.maximum(drawn[0] * np.array([0.85, 0.7, 0]), settings.span_limits[0])
+        lengths = np.r_[drawn, shorter]
         s = lengths[:, None] * u
         x = nodes[k, 0] + s * np.cos(heading)
         y = nodes[k, 1] + s * np.sin(heading)

@@ -41,7 +41,9 @@ def pack(values: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, Any]] | N
         size = np.min_scalar_type(-int(np.abs(rest).max()) - 1)
         if size.itemsize > np.dtype(np.int16).itemsize:
             continue
-        change = np.diff(whole.astype(np.int32), axis=1, prepend=np.int32(0))
+        places = whole.astype(np.int32)
+        change = places.copy()
+        change[:, 1:] -= places[:, :-1]
         steps = ((change << 1) ^ (change >> 31)).view(np.uint32)
         return {"steps": steps, "rest": rest.astype(size)}, {
             "step": step,

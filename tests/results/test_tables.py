@@ -368,3 +368,32 @@ def test_the_times_of_a_study_stand_in_a_table_of_their_own(results: Results):
     a = row(found, case="A")
     assert (a["experiment"], a["n_trainings"], a["training_seconds"]) == ("s", 2, 2.5)
     assert (a["training_seconds_std"], a["inference_ms"]) == (pytest.approx(0.5**0.5), 5.0)
+
+
+def test_the_table_of_the_dataset_counts_wrong_labels_and_measures_true_towers(
+    results: Results, thesis: Thesis
+):
+    path = results.folder / "crops" / "north" / "manifest.json"
+    manifest = json.loads(path.read_text())
+    for entry, (labelled, wrong) in zip(
+        manifest["crops"], ((100, 10), (300, 200), (0, 0)), strict=True
+    ):
+        entry |= {"labelled": labelled, "wrong": wrong}
+    path.write_text(json.dumps(manifest))
+    towers = pd.read_csv(results.folder / "towers" / "north" / "towers.csv")
+    towers.assign(width=3.0).to_csv(results.folder / "towers/north/true_towers.csv", index=False)
+    found = tables.TABLES["dataset"].make(results, thesis).set_index("property")
+    assert found.loc["crops", "value"] == 3
+    assert found.loc["crops", "thesis"] == 2823
+    assert found.loc["wrong", "value"] == pytest.approx(100 * 210 / 400)
+    assert found.loc["wrong", "counted"] == 400
+    assert found.loc["true width", "value"] == 3.0
+    assert found.loc["true height", "highest"] == 40.0
+    assert found.loc["true spacing", "counted"] == 2
+
+
+def test_without_known_truth_the_table_of_the_dataset_has_the_crops(
+    results: Results, thesis: Thesis
+):
+    found = tables.TABLES["dataset"].make(results, thesis)
+    assert list(found["property"]) == ["crops", "points of a crop"]

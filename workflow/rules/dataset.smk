@@ -16,13 +16,13 @@ rule towers:
         f"{R}/benchmarks/towers/{{survey}}.tsv"
     wildcard_constraints:
         survey=any_of(TRAIN),
+    priority: 1
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
-    priority: 1
     params:
         job=lambda w: job(
             "towers",
@@ -53,13 +53,13 @@ rule crops:
         f"{R}/benchmarks/crops/{{survey}}.tsv"
     wildcard_constraints:
         survey=any_of(TRAIN),
+    priority: 1
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
         runtime=120,
-    priority: 1
     params:
         job=lambda w: job(
             "crops",

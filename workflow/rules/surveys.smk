@@ -46,13 +46,13 @@ rule check:
         f"{R}/logs/check/{{survey}}.log",
     benchmark:
         f"{R}/benchmarks/check/{{survey}}.tsv"
+    priority: 1
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
         runtime=60,
-    priority: 1
     params:
         job=lambda w: job(
             "check",

@@ -12,6 +12,7 @@ from scenenet.core.files import write_text
 from scenenet.experiments.published import Thesis
 from scenenet.report.blocks import Section
 from scenenet.report.context import ReportContext, SectionMaker
+from scenenet.report.sections import claims as claim_sections
 from scenenet.report.sections import crops as crop_sections
 from scenenet.report.sections import dataset as dataset_sections
 from scenenet.report.sections import models as model_sections
@@ -29,6 +30,7 @@ MAIN_EXPERIMENT = "cross_validation"
 """The experiment that is shown first, because every crop counts in it."""
 
 SECTIONS: Sequence[SectionMaker] = (
+    claim_sections.claims,
     overview.overview,
     EXPERIMENT_SECTIONS[MAIN_EXPERIMENT],
     model_sections.models,
@@ -38,7 +40,7 @@ SECTIONS: Sequence[SectionMaker] = (
     crop_sections.crops,
     study_sections.studies,
     *(make for name, make in EXPERIMENT_SECTIONS.items() if name != MAIN_EXPERIMENT),
-    study_sections.thesis_and_ours,
+    claim_sections.published_numbers,
     survey_sections.predictions,
     dataset_sections.data,
     dataset_sections.towers,

@@ -73,15 +73,19 @@ DATASET_TABLES = tuple(
 )
 """Stems of the tables that the surveys and crops alone decide."""
 
-COMPARISON, TIMES_COMPARISON = "thesis_and_ours", "thesis_and_ours_times"
-"""Stems of the tables of ``scenenet.results.thesis_comparison``."""
+COMPARISONS = {
+    "claims": "Claims of the thesis",
+    "claims_times": "Claims of the thesis about times",
+    "published_numbers": "Published numbers",
+    "published_numbers_times": "Published times",
+}
+"""Stems and titles of the tables of ``scenenet.results.claims`` and ``published_numbers``."""
 
 
 def table_titles() -> dict[str, tuple[str, str]]:
     """Stem of each table, those of the experiments included -> its title and its section."""
     titles = {name: (table.title, table.section) for name, table in TABLES.items()}
-    titles[COMPARISON] = ("Thesis and this run", "models")
-    titles[TIMES_COMPARISON] = ("Thesis and this run, times", "models")
+    titles |= {name: (title, "thesis") for name, title in COMPARISONS.items()}
     return titles | {name: (one.title, one.section) for name, one in EXPERIMENTS.items()}
 
 
@@ -126,7 +130,8 @@ def digest_scores(folder: str | Path, names: Iterable[str]) -> dict[str, Any]:
     Returns:
         ``digest``, and ``tables``: stem -> sha256 of its file.
     """
-    timed = {name for name, table in TABLES.items() if table.times} | {TIMES_COMPARISON}
+    timed = {name for name, table in TABLES.items() if table.times}
+    timed |= {name for name in COMPARISONS if name.endswith("_times")}
     compared = sorted(set(names) - timed)
     prints = {name: sha256(Path(folder) / f"{name}.csv") for name in compared}
     return {"digest": digest(prints), "tables": prints}

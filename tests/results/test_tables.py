@@ -18,9 +18,10 @@ from scenenet.experiments.studies.settings import StudySettings
 from scenenet.metrics.score_columns import AT_TAU, SCORES, WHOLE_TOWERS
 from scenenet.models.model_file import read_model
 from scenenet.results import tables
+from scenenet.results.claims.table import write_claims
 from scenenet.results.folder import Results
+from scenenet.results.published_numbers import write_published_numbers
 from scenenet.results.score_tables import TRIVIAL
-from scenenet.results.thesis_comparison import write_comparison
 from scenenet.results.time_tables import experiment_times
 
 
@@ -297,9 +298,9 @@ def test_two_runs_that_differ_in_their_times_have_the_same_digest_of_scores(
 ):
     def digest_of(folder: str) -> dict:
         written = tables.write_tables(replace(results), thesis, tmp_path / folder)
-        comparisons = [tmp_path / folder / f"{n}.csv" for n in (tables.COMPARISON,
-                       tables.TIMES_COMPARISON)]  # fmt: skip
-        write_comparison(replace(results), thesis, *comparisons)
+        comparisons = [tmp_path / folder / f"{name}.csv" for name in tables.COMPARISONS]
+        write_claims(replace(results), thesis, *comparisons[:2])
+        write_published_numbers(replace(results), thesis, *comparisons[2:])
         return tables.digest_scores(
             tmp_path / folder, [path.stem for path in (*written, *comparisons)]
         )
@@ -315,8 +316,9 @@ def test_two_runs_that_differ_in_their_times_have_the_same_digest_of_scores(
     assert digest_of("slower") == first
     slower, before = (tmp_path / name / "times.csv" for name in ("slower", "first"))
     assert slower.read_bytes() != before.read_bytes()
-    assert {"seeds", "models", "thesis_and_ours"} <= set(first["tables"])
-    assert not {"times", "seed_times", "thesis_and_ours_times"} & set(first["tables"])
+    assert {"seeds", "models", "claims", "published_numbers"} <= set(first["tables"])
+    timed = {"times", "seed_times", "claims_times", "published_numbers_times"}
+    assert not timed & set(first["tables"])
     evaluation = results.folder / "evaluate" / "cnn" / "seed-0.json"
     told = json.loads(evaluation.read_text())
     told["voxel"]["precision"] += 0.01

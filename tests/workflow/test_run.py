@@ -42,7 +42,7 @@ def test_a_run_ends_with_every_result(finished):
         "results/mlflow/registry.json",
         "results/study/ablations/runs.csv",
         "results/tables/study-ablations.csv",
-        "results/tables/thesis_and_ours.csv",
+        "results/tables/claims.csv",
         "results/figures/study-ablations.png",
         "results/boosted_trees/seed-1.json",
         "results/interactive_crop/median.json",

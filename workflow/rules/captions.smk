@@ -8,6 +8,7 @@ from scenenet.results.tables import table_titles
 # Numbered, because the report sorts them by name; the order is that of the page.
 CATEGORIES = {
     "page": "1 Page",
+    "thesis": "2 Models",
     "models": "2 Models",
     "learned": "2 Models",
     "training": "2 Models",

@@ -5,7 +5,7 @@ rule tables:
     input:
         dataset=every("dataset_tables", "tables"),
         checks=every("check", "classes", survey=TRAIN),
-        towers=every("towers", "towers"),
+        towers=[*every("towers", "towers"), *every("towers", "true_towers")],
         crops=every("crops", "manifest"),
         voxelisation_time=every("voxelisation_time", "times"),
         split=every("split", "split"),
@@ -23,9 +23,7 @@ rule tables:
         thesis=ancient(own_file(settings.thesis)),
     output:
         tables=[table_in_report(f"{R}/tables/{name}.csv") for name in table_names()],
-        comparisons=[
-            table_in_report(f"{R}/tables/{name}.csv") for name in (COMPARISON, TIMES_COMPARISON)
-        ],
+        comparisons=[table_in_report(f"{R}/tables/{name}.csv") for name in COMPARISONS],
         scores=f"{R}/tables/scores.json",
         provenance=f"{R}/tables/provenance.json",
     log:

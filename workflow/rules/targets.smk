@@ -10,7 +10,7 @@ from snakemake.io import is_flagged
 
 from scenenet.figures import plan
 from scenenet.results.folder import Results
-from scenenet.results.tables import COMPARISON, DATASET_TABLES, TABLES, TIMES_COMPARISON
+from scenenet.results.tables import COMPARISONS, DATASET_TABLES, TABLES
 
 
 def every(stage, output, **values):

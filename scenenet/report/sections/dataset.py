@@ -64,7 +64,8 @@ def towers(context: ReportContext) -> Section | None:
     )
     blocks: list[Block] = [table(frame.fillna({"unit": ""}), columns, caption, "tables/towers.csv")]
     if (crops := context.table("dataset")) is not None:
-        blocks.append(table(crops.fillna({"unit": ""}), CROPS, CROPS_CAPTION, "tables/dataset.csv"))
+        shown = crops.astype({"unit": object}).fillna({"unit": ""})
+        blocks.append(table(shown, CROPS, CROPS_CAPTION, "tables/dataset.csv"))
     maps = [f for survey in context.results.surveys for f in context.figures_of(survey, "towers")]
     return Section("towers", "The towers", [*blocks, *maps])
 

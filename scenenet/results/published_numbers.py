@@ -1,4 +1,4 @@
-"""Every published number compared with the number of this run."""
+"""Every published number beside the number of this run, without a verdict."""
 
 from __future__ import annotations
 
@@ -9,118 +9,46 @@ from typing import Any
 import pandas as pd
 
 from scenenet.core.files import atomic
-from scenenet.experiments.published import Published, Thesis
+from scenenet.experiments.published import Thesis
 from scenenet.experiments.studies.findings import as_good_as_best
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.experiments.studies.summary import summarise
 from scenenet.metrics.score_columns import PUBLISHED_SCORES
 from scenenet.results import tables
-from scenenet.results.folder import Results, SeedResult
+from scenenet.results.claims.evidence import representative, settings_of
+from scenenet.results.folder import Results
 
-COLUMNS = ("name", "place", "what", "unit", "thesis", "spread", "low", "high", "ours", "verdict",
-           "remark")  # fmt: skip
-
-REPRODUCED, BETTER, NOT, UNMEASURED = "reproduced", "better", "not", "not measured"
-
-SCORE_TOLERANCE = 0.05
-"""Scores within this difference are equal; the spread over seeds in the thesis is up to 0.08."""
-TOLERANCE = 0.2
-"""Other numbers are equal within this relative difference."""
+COLUMNS = ("name", "place", "what", "unit", "thesis", "spread", "low", "high", "ours")
 
 TIME_NAMES = ("times.", "voxelisation.")
 """Beginnings of the names of published times."""
 
-SCORE_ENDINGS = tuple(f".{name}" for name in PUBLISHED_SCORES)
-"""Endings of the names of published scores."""
 
-REMARKS: Mapping[str, str] = {
-    "data.": "A number of the data of the thesis; the section on the surveys describes the data "
-    "of this run.",
-    "class_share.": "Other land, and the labels of the crops use other codes than Table 5.1 "
-    "(docs/method/synthetic.md).",
-    "towers.": "Other lines: the public crops have poles of 10 to 20 m, the statistics of the "
-    "thesis are of pylons.",
-    "voxelisation.": "Time on the machine of this run; points are counted without sorting.",
-    "protocol.epochs_needed": "The fewest epochs with an F0.5 equal to the best within the spread "
-    "over seeds; an epoch has fewer steps in this run.",
-    "protocol.crops_needed": "The fewest training crops, of the numbers tried, with an F0.5 "
-    "equal to the best within the spread over seeds.",
-    "protocol.": "A setting and not a result, chosen for other and fewer crops.",
-    "parameters.": "Weights of two runs can be compared only if the values of their kernels are "
-    "similar.",
-    "models.": "Other and fewer crops than in the thesis.",
-    "times.": "Time on the machine of this run, with other and fewer crops.",
-    "kernel_size.": "Other and fewer crops than in the thesis.",
-    "ablation.": "Other and fewer crops than in the thesis.",
-    "starts.": "Other and fewer crops than in the thesis.",
-    "measurement.": "Measured by F0.5 in this run, by the loss in the thesis.",
-    "loss.": "Depends on the data and on the weights f_w.",
-}
-"""Why a number differs from the published one, by the beginning of its name."""
+def published_numbers(results: Results, thesis: Thesis) -> pd.DataFrame:
+    """A row per published number, in the order of the thesis, with the number of this run.
 
-
-def compare(results: Results, thesis: Thesis) -> pd.DataFrame:
-    """A row per published number, in the order of the thesis.
-
-    ``verdict`` is ``reproduced`` (within tolerance or inside the published range), ``better`` (a
-    higher score, a shorter time), ``not``, or ``not measured``; every row that is neither of the
-    first two has a ``remark``.
+    Most are settings, counts and single scores, which agree or differ for many reasons; what the
+    thesis concludes from them is judged by ``scenenet.results.claims``.
     """
     ours = _ours(results, thesis)
-    rows = []
-    for name, number in thesis.numbers.items():
-        value = ours.get(name)
-        verdict = _verdict(name, number, value)
-        remark = "" if verdict in (REPRODUCED, BETTER) else _remark(name)
-        rows.append((name, number.place, number.what or name, number.unit, number.value,
-                     number.spread, number.low, number.high, value, verdict, remark))  # fmt: skip
+    rows = [
+        (name, number.place, number.what or name, number.unit, number.value, number.spread,
+         number.low, number.high, ours.get(name))
+        for name, number in thesis.numbers.items()
+    ]  # fmt: skip
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def write_comparison(
+def write_published_numbers(
     results: Results, thesis: Thesis, out: str | Path, out_times: str | Path
 ) -> None:
-    """Write ``compare`` as two CSV files: times apart, because they differ between equal runs."""
-    every = compare(results, thesis)
+    """Write ``published_numbers`` as two CSV files: times apart, because they differ between equal
+    runs."""
+    every = published_numbers(results, thesis)
     timed = every["name"].str.startswith(TIME_NAMES)
     for part, path in ((every[~timed], out), (every[timed], out_times)):
         with atomic(path) as partial:
             part.to_csv(partial, index=False, float_format="%.6g")
-
-
-def _verdict(name: str, number: Published, ours: float | None) -> str:
-    if ours is None or ours != ours:
-        return UNMEASURED
-    if name.startswith(TIME_NAMES):
-        bound = number.value if number.value is not None else number.high
-        assert bound is not None, name
-        # A negative bound is a time saved: the lower, the better.
-        better = bound / (1 + TOLERANCE) if bound > 0 else bound * (1 + TOLERANCE)
-        return BETTER if ours < better else _near(number, ours)
-    if name.endswith(SCORE_ENDINGS) and not name.startswith("models.lift"):
-        assert number.value is not None, name
-        if ours > number.value + SCORE_TOLERANCE:
-            return BETTER
-        return REPRODUCED if ours >= number.value - SCORE_TOLERANCE else NOT
-    if name.endswith("alive_share"):
-        assert number.value is not None, name
-        return BETTER if ours > number.value * (1 + TOLERANCE) else _near(number, ours)
-    return _near(number, ours)
-
-
-def _near(number: Published, ours: float) -> str:
-    if number.low is not None or number.high is not None:
-        low = number.low if number.low is not None else float("-inf")
-        high = number.high if number.high is not None else float("inf")
-        if low <= ours <= high:
-            return REPRODUCED
-    if number.value is None:
-        return NOT
-    return REPRODUCED if abs(ours - number.value) <= TOLERANCE * abs(number.value) else NOT
-
-
-def _remark(name: str) -> str:
-    return next((text for start, text in REMARKS.items() if name.startswith(start)), "")
 
 
 def _ours(results: Results, thesis: Thesis) -> dict[str, float | None]:
@@ -163,9 +91,9 @@ SETTINGS: Mapping[str, str] = {
 
 
 def _of_settings(results: Results, thesis: Thesis) -> dict[str, float | None]:
-    name = _first(results, "scenenet")
+    name = representative(results, "scenenet")
     trained = [] if name is None else results.of_model(name)
-    settings = _settings(trained[0]) if trained else {}
+    settings = settings_of(trained[0]) if trained else {}
     found: dict[str, float | None] = {}
     for ours, dotted in SETTINGS.items():
         value: Any = settings
@@ -179,17 +107,12 @@ def _of_settings(results: Results, thesis: Thesis) -> dict[str, float | None]:
     return found
 
 
-def _settings(trained: SeedResult) -> Mapping[str, Any]:
-    """The settings of a training; empty if its record has none."""
-    return (trained.provenance or {}).get("settings") or {}
-
-
 def _of_models(results: Results, thesis: Thesis) -> dict[str, float | None]:
     """Each architecture is represented by its first model, with the mean over all seeds."""
     found: dict[str, float | None] = {}
     every = tables.models(results, thesis)
     for kind in ("scenenet", "cnn"):
-        name = _first(results, kind)
+        name = representative(results, kind)
         rows = every[(every["model"] == name) & (every["counted"] == "all seeds")]
         if rows.empty:
             continue
@@ -220,7 +143,7 @@ def _of_times(results: Results, thesis: Thesis) -> dict[str, float | None]:
         return {}
     found: dict[str, float | None] = {}
     for kind in ("scenenet", "cnn"):
-        rows = times[times["model"] == _first(results, kind)]
+        rows = times[times["model"] == representative(results, kind)]
         if rows.empty:
             continue
         row = rows.iloc[0]
@@ -233,16 +156,6 @@ def _of_times(results: Results, thesis: Thesis) -> dict[str, float | None]:
     if scenenet is not None and cnn is not None:
         found["times.lift.inference"] = scenenet - cnn
     return found
-
-
-def _first(results: Results, kind: str) -> str | None:
-    """The first model of an architecture, preferably one of the thesis protocol."""
-    names = [model for model, k in results.models.items() if k == kind]
-    for name in names:
-        trained = results.of_model(name)
-        if trained and _settings(trained[0]).get("protocol", "thesis") == "thesis":
-            return name
-    return names[0] if names else None
 
 
 def _of_studies(results: Results, thesis: Thesis) -> dict[str, float | None]:

@@ -162,16 +162,6 @@ class Lattice:
         ]
         return cls.voxels(np.concatenate(lines))
 
-    @classmethod
-    def tree(cls, x: float, y: float, height: float, seed: int = 0) -> np.ndarray:
-        """A conifer: a cone of voxels, widest at a quarter of its height."""
-        rng = np.random.default_rng(seed)
-        z = rng.uniform(height / 4, height, 400)
-        away = 4 * (1 - z / height) * np.sqrt(rng.uniform(0, 1, 400))
-        turn = rng.uniform(0, 2 * np.pi, 400)
-        crown = np.column_stack([x + away * np.cos(turn), y + away * np.sin(turn), z])
-        return np.unique(np.concatenate([cls.voxels(crown), cls.column(x, y, 1, height)]), axis=0)
-
     @staticmethod
     def together(*parts: np.ndarray) -> np.ndarray:
         return np.unique(np.concatenate(parts), axis=0)

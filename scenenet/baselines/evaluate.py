@@ -7,15 +7,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from scenenet.dataset.crops import CropClouds
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
+from scenenet.dataset.voxels import median_voxel_size
 from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.answers import rules_on
 from scenenet.evaluation.scoring import score_predictions
 from scenenet.models.settings import BOOSTED_TREES
 
 
 def evaluate_boosted_trees(
     voxel_manifests: Sequence[str | Path],
+    crop_manifests: Sequence[str | Path],
     split: str | Path,
     detection: DetectionSettings,
     seeds: Sequence[int],
@@ -25,6 +29,7 @@ def evaluate_boosted_trees(
     """Train boosted trees with each seed, tune them on validation and score them on test crops.
 
     Args:
+        voxel_manifests, crop_manifests: of the stores of voxels, and of the crops they are of.
         outs: JSON file of each seed: the result of ``score_predictions``, with ``parameters``.
         out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels per edge
             (``scenenet.evaluation.inference_time``), and ``peak_memory_mb`` of the whole call.
@@ -38,6 +43,7 @@ def evaluate_boosted_trees(
         part: load(voxel_manifests, crops_in(split, part))
         for part in ("train", "validation", "test")
     }
+    clouds, size = CropClouds(crop_manifests), median_voxel_size(parts["train"].samples)
     seconds: list[float] = []
     inference_ms: dict[str, float] = {}
     for seed, out in zip(seeds, outs, strict=True):
@@ -48,8 +54,9 @@ def evaluate_boosted_trees(
         seconds.append(time.perf_counter() - begin)
         model = boosted_trees.tune(grown, parts["validation"].samples)
         tau = model.threshold()
+        answer = rules_on(clouds, model.probabilities, tau, size, detection)
         scores = score_predictions(
-            BOOSTED_TREES, seed, tau, model.probabilities, parts["test"], detection
+            BOOSTED_TREES, seed, tau, model.probabilities, parts["test"], answer
         )
         scores = replace(scores, part="test", parameters=model.n_parameters())
         write_json(out, scores.to_json())

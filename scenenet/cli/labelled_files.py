@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,15 @@ from scenenet.core.errors import InputError, in_file, warn
 from scenenet.core.outputs import check_space
 from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.unchanged import unchanged
-from scenenet.dataset.crops import Crop, CropSettings, CropSpace, Truth, crop_of, cut_crops
+from scenenet.dataset.crops import (
+    Crop,
+    CropClouds,
+    CropSettings,
+    CropSpace,
+    Truth,
+    crop_of,
+    cut_crops,
+)
 from scenenet.dataset.labelled_towers import LabelledTowers, TowerSettings, survey_towers
 from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.voxel_cache import VOXEL_BYTES, Dataset, build, load
@@ -21,13 +29,15 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.result import Evaluation, PointScores, TowerScores
 from scenenet.evaluation.scoring import score
 from scenenet.evaluation.surveys import LabelledSurvey, SurveyScores, score_survey
+from scenenet.evaluation.tune import with_answer
 from scenenet.interpretability.determination import determination
 from scenenet.interpretability.parameter_sentences import parameters_of
+from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import read_model, write_model
 from scenenet.models.settings import ModelSettings, TuningSettings
-from scenenet.pointcloud import survey_in_metres
+from scenenet.pointcloud import PointCloud, survey_in_metres
 from scenenet.pointcloud.quality.screening import survey_warnings
 from scenenet.pointcloud.reading import same_points
 from scenenet.pointcloud.ts40k import sample_files
@@ -47,6 +57,7 @@ class LabelledFiles:
         skipped: files or samples without a crop, and labelled points that are no tower, with the
             reason.
         warnings: what looks wrong about the files, as sentences that begin with the path.
+        clouds: the points of each crop by its id, in the folder that they were written to.
     """
 
     dataset: Dataset = field(default_factory=lambda: Dataset([], [], "", []))
@@ -55,6 +66,7 @@ class LabelledFiles:
     read: list[Path] = field(default_factory=list)
     skipped: list[dict[str, str]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    clouds: Mapping[str, PointCloud] = field(default_factory=dict)
 
 
 def read_labelled(
@@ -62,6 +74,7 @@ def read_labelled(
     codes: str,
     grid: VoxelSettings,
     failures: Failures,
+    scratch: Path,
     split: SplitSettings | None = None,
     truths: Sequence[Path] = (),
 ) -> LabelledFiles:
@@ -71,6 +84,7 @@ def read_labelled(
         paths: surveys (cut into crops around their towers), and TS40K samples or folders of them.
         codes: class scheme of the labels.
         failures: gets the errors of the files that cannot be read; the others are read.
+        scratch: an empty folder, for the points of the crops.
         split: the shares of the split; a single crop is not split.
         truths: for each of ``paths`` a file with the same points in the same order, with the true
             classes, or a folder of such samples; empty where the truth is not known.
@@ -86,23 +100,23 @@ def read_labelled(
     stored = sum(space.stored + VOXEL_BYTES * space.points for space in seen.values())
     spooled = max((space.temporary for space in seen.values()), default=0)
     check_space({temporary_directory(): stored + spooled})
-    with scratch_folder() as scratch:
-        manifests: list[tuple[Path, Path]] = []
-        for number, (path, truth) in enumerate(pairs, start=1):
-            if (path, truth) not in seen:
-                continue
-            # The number keeps files of the same name in different folders apart.
-            name = path.stem if len(paths) == 1 else f"{number}-{path.stem}"
-            used = [path] if truth is None else [path, truth]
-            with failures.collect(), unchanged(*used), in_file(path):
-                folder = scratch / f"{number}"
-                manifests.append(_read_file(path, truth, name, codes, grid, folder, files))
-        dataset = load([voxels for _, voxels in manifests])
-        parts = {}
-        if split is not None and len(dataset.samples) > 1:
-            table = split_crops([crops for crops, _ in manifests], split)
-            parts = dict(zip(table["crop"], table["part"], strict=True))
-    return replace(files, dataset=dataset, parts=parts)
+    manifests: list[tuple[Path, Path]] = []
+    for number, (path, truth) in enumerate(pairs, start=1):
+        if (path, truth) not in seen:
+            continue
+        # The number keeps files of the same name in different folders apart.
+        name = path.stem if len(paths) == 1 else f"{number}-{path.stem}"
+        used = [path] if truth is None else [path, truth]
+        with failures.collect(), unchanged(*used), in_file(path):
+            folder = scratch / f"{number}"
+            manifests.append(_read_file(path, truth, name, codes, grid, folder, files))
+    crops = [crops for crops, _ in manifests]
+    dataset = load([voxels for _, voxels in manifests])
+    parts = {}
+    if split is not None and len(dataset.samples) > 1:
+        table = split_crops(crops, split)
+        parts = dict(zip(table["crop"], table["part"], strict=True))
+    return replace(files, dataset=dataset, parts=parts, clouds=CropClouds(crops))
 
 
 def _look(pair: tuple[Path, Path | None]) -> CropSpace:
@@ -193,6 +207,7 @@ def train_files(
     tuning: TuningSettings,
     seeds: Sequence[int],
     validation: float,
+    detection: DetectionSettings,
     provenance: dict[str, Any],
     out: str | Path,
     failures: Failures,
@@ -202,6 +217,7 @@ def train_files(
     Args:
         validation: share of the crops for tuning. With 0 or a single crop, models are tuned on the
             training crops. The scores are then too high, and ``tuned_on`` is ``training``.
+        detection: what makes a tower; the model whose towers are best is chosen.
 
     Returns:
         the scores of each seed, the chosen seed, the parameters of the chosen model and whether
@@ -213,21 +229,23 @@ def train_files(
         typer.Exit: no file could be read.
     """
     split = SplitSettings(train=1 - validation, validation=validation, test=0, neighbour=0)
-    files = read_labelled(paths, codes, grid, failures, split if validation > 0 else None)
-    data = files.dataset
-    _require_crops(files, paths, failures)
-    kept = [s for s in data.samples if files.parts.get(s.id) == "validation"]
-    provenance = provenance | {"files": [path.name for path in files.read]}
-    training = [s for s in data.samples if files.parts.get(s.id) != "validation"]
-    candidates = []
-    for seed in seeds:
-        model, _ = fit(training, kept, settings, seed)
-        card = card_of(replace(data, samples=training), settings, grid, seed, provenance)
-        tuned, card, result = choose(
-            model, card, kept or training, tuning, training if kept else ()
-        )
-        candidates.append((seed, tuned, card, result))
-    seed, tuned, card, result = max(candidates, key=lambda entry: entry[3].validation.decisive)
+    with scratch_folder() as scratch:
+        wanted = split if validation > 0 else None
+        files = read_labelled(paths, codes, grid, failures, scratch, wanted)
+        data = files.dataset
+        _require_crops(files, paths, failures)
+        kept = [s for s in data.samples if files.parts.get(s.id) == "validation"]
+        provenance = provenance | {"files": [path.name for path in files.read]}
+        training = [s for s in data.samples if files.parts.get(s.id) != "validation"]
+        tuned_on, others = (kept, training) if kept else (training, [])
+        candidates = []
+        for seed in seeds:
+            model, _ = fit(training, kept, settings, seed)
+            card = card_of(replace(data, samples=training), settings, grid, seed, provenance)
+            tuned, card, result = choose(model, card, tuned_on, tuning, others)
+            result = with_answer(result, tuned, card, tuned_on, files.clouds, detection)
+            candidates.append((seed, tuned, card, result))
+    seed, tuned, card, result = max(candidates, key=lambda entry: entry[3].decisive)
     write_model(out, tuned, card)
     return {
         "model": str(out),
@@ -236,8 +254,14 @@ def train_files(
         "kernel_size": list(result.kernel_size),
         "tuned_on": "validation" if kept else "training",
         "scores": asdict(result.validation),
+        "whole_towers": _plain(result.whole_towers),
         "seeds": [
-            {"seed": s, "kernel_size": list(r.kernel_size), **asdict(r.validation)}
+            {
+                "seed": s,
+                "kernel_size": list(r.kernel_size),
+                **asdict(r.validation),
+                "whole_towers": _plain(r.whole_towers),
+            }
             for s, _, _, r in candidates
         ],
         "numbers": _numbers(tuned, [candidate for _, candidate, _, _ in candidates]),
@@ -245,6 +269,10 @@ def train_files(
         "skipped": files.skipped,
         "warnings": files.warnings,
     }
+
+
+def _plain(scores: VoxelScores | None) -> dict[str, Any] | None:
+    return None if scores is None else asdict(scores)
 
 
 def _numbers(chosen: VoxelModel, models: Sequence[VoxelModel]) -> list[dict[str, Any]]:
@@ -291,14 +319,17 @@ def evaluate_files(
     trained, card = read_model(model)
     whole_surveys = grid is None
     grid = grid or VoxelSettings(fit="metric", voxel_size=card.voxel_size)
-    files = read_labelled(paths, codes, grid, failures, truths=truths)
+    with scratch_folder() as scratch:
+        files = read_labelled(paths, codes, grid, failures, scratch, truths=truths)
     if not (whole_surveys and files.surveys):
         _require_crops(files, paths, failures)
     found = SurveyScores()
+    grids = {sample.id: sample.grid for sample in files.dataset.samples}
     for survey in files.surveys:
         with failures.collect():
-            found += score_survey(survey, model, detection)
-    result = score(trained, card, files.dataset, detection, found.by_crop)
+            found += score_survey(survey, model, detection, grids)
+    scored = files.dataset.only(found.by_crop)
+    result = score(trained, card, scored, lambda sample: found.by_crop[sample.id])
     result = _of_whole_files(result, found, towers=whole_surveys)
     return result.to_json() | {"skipped": files.skipped, "warnings": files.warnings}
 

@@ -24,6 +24,12 @@ def training_lines(result: dict[str, Any]) -> list[str]:
         f"R {score_text(scores['recall'])} F0.5 {score_text(scores['f05'], 3)} "
         f"tower IoU {score_text(scores['iou_tower'], 3)}",
     ]
+    if (whole := result["whole_towers"]) is not None:
+        lines.append(
+            f"whole towers in these crops: P {score_text(whole['precision'])} "
+            f"R {score_text(whole['recall'])} F0.5 {score_text(whole['f05'], 3)}; "
+            "the seed was chosen by this F0.5"
+        )
     lines += _number_lines(result["numbers"])
     return lines + [f"skipped: {s['sample']}: {s['reason']}" for s in result["skipped"]]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -165,13 +165,40 @@ def cut_crops(
 def read_crops(manifest: str | Path) -> Iterator[tuple[Crop, PointCloud]]:
     """The crops of a store, one at a time, without the CRS of the survey."""
     reader = StoreReader(manifest)
-    scheme = class_scheme(reader.manifest["codes"])
     for entry in reader.manifest["crops"]:
-        arrays = reader.get(entry["id"])
-        cloud = PointCloud(
-            arrays["xyz"], arrays["classification"], scheme, truth=arrays.get("truth")
-        )
-        yield crop_of(entry), cloud
+        yield crop_of(entry), _cloud(reader, entry["id"])
+
+
+class CropClouds(Mapping[str, PointCloud]):
+    """The points of the crops of some stores by the id of the crop, read when they are needed.
+
+    Args:
+        manifests: of the crop stores.
+
+    Raises:
+        InputError: a store does not match its manifest.
+    """
+
+    def __init__(self, manifests: Iterable[str | Path]) -> None:
+        self._readers: dict[str, StoreReader] = {}
+        for manifest in manifests:
+            reader = StoreReader(manifest)
+            self._readers |= {entry["id"]: reader for entry in reader.manifest["crops"]}
+
+    def __getitem__(self, crop: str) -> PointCloud:
+        return _cloud(self._readers[crop], crop)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._readers)
+
+    def __len__(self) -> int:
+        return len(self._readers)
+
+
+def _cloud(reader: StoreReader, crop: str) -> PointCloud:
+    arrays = reader.get(crop)
+    scheme = class_scheme(reader.manifest["codes"])
+    return PointCloud(arrays["xyz"], arrays["classification"], scheme, truth=arrays.get("truth"))
 
 
 def crop_of(entry: dict[str, Any]) -> Crop:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +97,12 @@ class Dataset:
     crops: list[Crop]
     codes: str
     content: list[str]
+
+    def only(self, ids: Collection[str]) -> Dataset:
+        """The data set with the crops of ``ids`` alone."""
+        rows = [row for row, sample in enumerate(self.samples) if sample.id in ids]
+        samples, crops = [self.samples[row] for row in rows], [self.crops[row] for row in rows]
+        return replace(self, samples=samples, crops=crops)
 
 
 def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Dataset:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -185,9 +186,13 @@ class VoxelSample:
         probability (M,) of the occupied ones; empty voxels have 0."""
         probability = np.zeros(self.grid.n_voxels, np.float32)
         probability[self.index] = occupied
+        return probability, self.labels()
+
+    def labels(self) -> np.ndarray:
+        """(V,) bool: the voxels of the grid that are labelled tower."""
         labelled = np.zeros(self.grid.n_voxels, bool)
         labelled[self.tower_index()] = True
-        return probability, labelled
+        return labelled
 
     def truth(self) -> np.ndarray | None:
         """(V,) bool: the voxels of the grid that are tower in truth; None where it is not known."""
@@ -221,6 +226,11 @@ def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSa
         true = np.zeros(len(index), bool)
         true[np.searchsorted(index, voxel[is_true])] = True
     return VoxelSample(sample_id, grid, index, count, tower, true)
+
+
+def median_voxel_size(samples: Iterable[VoxelSample]) -> float:
+    """m, the voxel size of a model that was trained on these samples."""
+    return float(np.median([sample.grid.voxel_size for sample in samples]))
 
 
 def _require_few(counts: np.ndarray, voxel_size: float, extent: np.ndarray) -> None:

@@ -90,12 +90,12 @@ def _unbroken(levels: np.ndarray, start: int, gap: float) -> int:
 
 def centre_body(
     around: np.ndarray, axis: np.ndarray, body: Body, voxel_size: float
-) -> tuple[np.ndarray, float, float]:
-    """Axis (2,) m through the centre of a body, its width in m, and the share that stands free.
+) -> tuple[np.ndarray, float]:
+    """Axis (2,) m through the centre of a body, and the share that stands free.
 
     At each level the body consists of the connected voxels near the axis. A level stands free if
     they are slim; otherwise a conductor, a tree or a building touches the body. If no level stands
-    free, the axis does not change and the width is NaN.
+    free, the axis does not change.
     """
     from scipy.ndimage import label
 
@@ -104,9 +104,9 @@ def centre_body(
     low, high = (part * body.height for part in MIDDLE)
     between = (relative[:, 2] >= low) & (relative[:, 2] <= high)
     places = relative[between & (np.hypot(relative[:, 0], relative[:, 1]) <= 4 * slim)]
-    at, width, free = np.zeros(2), float("nan"), 0.0
+    at, free = np.zeros(2), 0.0
     if len(places) == 0:
-        return axis, width, free
+        return axis, free
     steps = np.rint((places - places.min(axis=0)) / voxel_size).astype(int)
     volume = np.zeros(steps.max(axis=0) + 1, bool)
     volume[tuple(steps.T)] = True
@@ -116,14 +116,13 @@ def centre_body(
     for multiple in SEARCH_RADII:
         near = np.hypot(places[:, 0] - at[0], places[:, 1] - at[1]) <= multiple * slim
         in_body = np.isin(piece, np.unique(piece[near]))
-        centres, widths = [], []
+        centres = []
         for level in np.unique(steps[in_body, 2]):
             found = places[in_body & (steps[:, 2] == level), :2]
             size = np.ptp(found, axis=0) + voxel_size
             if size.max() <= 2 * slim + voxel_size:
                 centres.append((found.min(axis=0) + found.max(axis=0)) / 2)
-                widths.append(size.max())
         if centres:
-            at, width = np.median(centres, axis=0), float(np.median(widths))
+            at = np.median(centres, axis=0)
             free = len(centres) / len(np.unique(steps[in_body, 2]))
-    return axis + at, width, free
+    return axis + at, free

@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from scenenet.detection.conductor_rules import FAR, SCALES
 from scenenet.detection.settings import DetectionSettings
 
-SURROUNDINGS_M = FAR + max(SCALES)
-"""m, radius around an axis in which the survey is measured."""
+SURROUNDINGS_M = 28.0
+"""m, radius around an axis in which the survey is measured: conductors are looked for up to 20 m
+along them, where they may pass the axis at up to 20 m."""
 
 SAME_M = 0.5
 """m, axes closer to one another than this are the same."""

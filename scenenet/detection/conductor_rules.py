@@ -13,13 +13,6 @@ HEAD = 0.5
 """Share of the height above which conductors are looked for. Ground and shrubs are below; the
 insulators of a window tower reach down to little more than half its height."""
 
-FREE_AIR = 3.0
-"""m of empty space below a conductor, about the clearance that is kept from trees."""
-
-FREE_AIR_SHARE = 1 / 8
-"""The same as a share of the height. The levels of conductors are this far apart; the storeys of a
-building, three to four metres, are not."""
-
 MIN_ALONE, ALONE_M = 0.5, 1.5
 """Smallest share of points on conductors among the points within ``ALONE_M`` m of them."""
 
@@ -34,21 +27,9 @@ of a tower reaches."""
 RISE = 0.5
 """Steepest slope of a conductor; at the head of a tower on a slope it is about a third."""
 
-SCALES = 2.0, 4.0, 8.0
-"""m, radii of the neighbourhoods in which shape is measured. A small neighbourhood shows a single
-conductor; in a large one, conductors one to three metres apart look like one ribbon. Three radii
-cover all distances between conductors."""
-
-THIN = 0.25
-"""Largest variance across a conductor, or a ribbon of conductors, as a share of the variance along
-it. The edge of a half plane, such as a roof, has 0.28."""
-
-MIN_VOXELS = 5
-"""Smallest number of voxels for which a direction is measured."""
-
 SECTOR = 15.0
-"""Largest difference in degrees between the bearings within a span: voxels are coarse, and
-conductors diverge from the head to the crossarms of the next tower."""
+"""Largest difference in degrees between the bearings within a span: conductors diverge from the
+head to the crossarms of the next tower."""
 
 MIN_ANGLE = 45.0
 """Smallest angle in degrees between two spans; a line never turns back on itself."""

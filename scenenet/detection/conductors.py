@@ -1,14 +1,13 @@
 """Conductors that leave a tower, which distinguish it from other tall objects.
 
 A conductor is long, thin and nearly level, hangs in free air and leads away from the head of the
-tower that carries it. Points show all of this without labels (``ConductorPoints``), and so do the
-occupied voxels of a crop (``leaving_spans``): a treetop has its tree below, a roof is as wide as it
-is long, and no conductor leaves a street light.
+tower that carries it. Points show all of this without labels: a roof is as wide as it is long, a
+treetop has no straight line in it, and no conductor leaves a street light.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -19,8 +18,6 @@ from scenenet.detection.conductor_rules import (
     ATTACHED,
     CONTINUES_M,
     FAR,
-    FREE_AIR,
-    FREE_AIR_SHARE,
     GAP,
     HEAD,
     HIGHEST_M,
@@ -31,23 +28,18 @@ from scenenet.detection.conductor_rules import (
     MIN_ALONE,
     MIN_ANGLE,
     MIN_LENGTH,
-    MIN_VOXELS,
     NEAR,
     RISE,
-    SCALES,
     SECTOR,
     TESTED_CELL_M,
 )
+from scenenet.detection.surroundings import Surroundings
 
 BLOCK_M, BLOCKS_KEPT = 32.0, 256
 """m, edge of the blocks in which points on conductors are looked for, and number in memory."""
 
 GROUND = 5
 """Percentile of the elevations in a block that counts as its ground."""
-
-Surroundings = Callable[[np.ndarray, float], np.ndarray]
-"""A function of a position (2,) m and a radius in m, which returns the points, or the centres of
-the occupied voxels, within this radius in plan, (M, 3) m."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +55,7 @@ class Span:
         left, right: m, least and greatest distance to the right of the axis at which they pass it,
             as seen along the bearing.
         lowest, highest: m, heights of the lowest and the highest one above the foot, at the tower.
-        places: (M, 3) m, points or centres of voxels on the conductors.
+        places: (M, 3) m, points on the conductors.
     """
 
     bearing: float
@@ -75,47 +67,6 @@ class Span:
     lowest: float
     highest: float
     places: np.ndarray = field(repr=False, compare=False)
-
-
-def leaving_spans(
-    surroundings: np.ndarray,
-    axis: tuple[float, float],
-    base: float,
-    height: float,
-    crossarm: float,
-    voxel_size: float,
-) -> list[Span]:
-    """Directions in which conductors leave a tower, the longest first.
-
-    Args:
-        surroundings: (M, 3) m, centres of the occupied voxels, at least those within
-            ``FAR + max(SCALES)`` of the axis in plan. They must be on one lattice.
-        axis: m, x and y of the tower.
-        base, height: m, elevation of its foot and height above it.
-        crossarm: m, largest distance at which a conductor passes the axis.
-        voxel_size: m.
-    """
-    relative = surroundings - np.array([*axis, base])
-    distance = np.hypot(relative[:, 0], relative[:, 1])
-    near = relative[distance <= FAR + max(SCALES)]
-    if len(near) < MIN_VOXELS:
-        return []
-    distance = np.hypot(near[:, 0], near[:, 1])
-    at_head = (near[:, 2] >= HEAD * height) & (near[:, 2] <= height + RISE * distance)
-    if at_head.sum() < MIN_VOXELS:
-        return []
-    free_air = max(FREE_AIR, FREE_AIR_SHARE * height)
-    hanging = near[at_head & _hangs(near, voxel_size, free_air)]
-    if len(hanging) < MIN_VOXELS:
-        return []
-    from scenenet.detection.linear import long_and_thin  # compiled: half a second to import
-
-    off_axis = np.hypot(hanging[:, 0], hanging[:, 1])
-    # A conductor may pass the axis at up to ``crossarm``, so FAR along it can be further away.
-    candidate = (off_axis >= NEAR) & (off_axis <= np.hypot(FAR, crossarm))
-    place, heading, slope = long_and_thin(hanging, candidate)
-    spans = _spans(place, heading, slope, near, crossarm)
-    return [replace(span, places=span.places + np.array([*axis, base])) for span in spans]
 
 
 class ConductorPoints:
@@ -138,7 +89,8 @@ class ConductorPoints:
 
         Args:
             axis: (2,) m.
-            base, height, crossarm: as in ``leaving_spans``.
+            base, height: m, elevation of its foot and height above it.
+            crossarm: m, largest distance at which a conductor passes the axis.
             around: (N, 3) m, what is around the tower; it shows where the data end.
         """
         foot = np.array([*axis, base])
@@ -275,31 +227,11 @@ def _attachments(
     return float(left), float(right), float(lowest), float(highest)
 
 
-def _hangs(places: np.ndarray, voxel_size: float, free_air: float) -> np.ndarray:
-    """(M,) bool, whether the next occupied voxel below is more than ``free_air`` m away.
-
-    Two adjacent voxels of a column count as one, because a conductor that passes from one to the
-    other occupies both.
-    """
-    steps = np.rint((places - places.min(axis=0)) / voxel_size).astype(np.int64)
-    order = np.lexsort((steps[:, 2], steps[:, 1], steps[:, 0]))
-    x, y, z = steps[order].T
-    below = np.full(len(order), np.iinfo(np.int64).max // 2)
-    same = np.flatnonzero((np.diff(x) == 0) & (np.diff(y) == 0)) + 1
-    below[same] = z[same] - z[same - 1]
-    touching = np.flatnonzero(below == 1)
-    reached = below.copy()
-    reached[touching] = below[touching - 1]
-    hangs = np.empty(len(order), bool)
-    hangs[order] = reached * voxel_size > free_air
-    return hangs
-
-
 def _runs(bearing: np.ndarray, s: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:
     """Bearing in degrees, length in m and members (M,) bool of each span, the longest first.
 
     Args:
-        bearing: (M,) degrees, of voxels on conductors.
+        bearing: (M,) degrees, of points on conductors.
         s: (M,) m, their distances along the conductors.
     """
     left = np.ones(len(bearing), bool)

@@ -6,20 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenenet.detection.candidates import SAME_M, SURROUNDINGS_M, DetectedVoxels
+from scenenet.detection.candidates import SURROUNDINGS_M, DetectedVoxels
 from scenenet.detection.conductor_rules import FAR, FURTHEST_M, HEAD, WIDE, WIDEST_HEAD_M
-from scenenet.detection.conductors import ConductorPoints, Span, Surroundings
-from scenenet.detection.detect import (
-    DetectedTower,
-    highest_probability,
-    measured_axes,
-)
+from scenenet.detection.conductors import ConductorPoints, Span
 from scenenet.detection.following import leads_on
+from scenenet.detection.rough import RoughTower, rough_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.structure import BodyTests, Structure, measure_structure
-
-LOOSE = 0.75
-"""Share of the thresholds that a rough measurement in voxels has to reach."""
+from scenenet.detection.surroundings import Surroundings
 
 MIN_FREE = 1 / 3
 """Smallest share of the levels at which the body stands free, by points."""
@@ -29,19 +23,36 @@ APART_M = 2.0
 
 
 @dataclass(frozen=True)
-class MeasuredTower(DetectedTower):
+class MeasuredTower:
     """A tower, measured in points.
 
     Attributes:
+        x, y: m, centre of its body.
+        base: m, elevation of the ground at its axis.
+        height: m, from the base to its top.
+        width: m, of its body where it stands free.
+        free: share of the levels at which its body stands free.
+        upright: share of the levels from foot to top with a point of its body.
+        spans: directions in which conductors leave, the longest first.
+        probability: highest probability of its voxels.
+        voxels: rows of its detected voxels in the arguments of ``find_towers``.
         structure: its shape, which says which points are its own.
     """
 
+    x: float
+    y: float
+    base: float
+    height: float
+    width: float
+    free: float
+    upright: float
+    spans: tuple[Span, ...]
+    probability: float
+    voxels: np.ndarray
     structure: Structure
 
     @classmethod
-    def of(
-        cls, rough: DetectedTower, structure: Structure, spans: tuple[Span, ...]
-    ) -> MeasuredTower:
+    def of(cls, rough: RoughTower, structure: Structure, spans: tuple[Span, ...]) -> MeasuredTower:
         """A tower that was found at a rough one, with the conductors that lead on."""
         return cls(
             x=structure.x,
@@ -75,43 +86,33 @@ def find_towers(
 ) -> list[MeasuredTower]:
     """Find the towers among detected voxels and measure each in points, highest probability first.
 
-    Voxels give approximate axes, by tests that are less strict than those of ``detect_towers``. The
-    points around an axis then decide, so that the result hardly depends on where the borders of the
-    voxels lie.
+    Voxels give approximate axes (``scenenet.detection.rough``). The points around an axis then
+    decide, so that the result hardly depends on where the borders of the voxels lie.
 
     Args:
-        centres, probability, surroundings, voxel_size, tau: as in ``detect_towers``.
+        centres: (V, 3) m, of the voxels with probability >= ``settings.threshold(tau)``.
+        probability: (V,).
+        surroundings: gives the occupied voxels around a position.
         points: gives the points around a position.
+        voxel_size: m.
+        tau: threshold of the model.
     """
     if len(centres) == 0:
         return []
     offset = centres.min(axis=0)
     detected = DetectedVoxels(centres - offset, probability, voxel_size)
-    loose = settings.model_copy(
-        update={
-            "min_height": LOOSE * settings.min_height,
-            "min_upright": LOOSE * settings.min_upright,
-            "min_conductor": 0.0,
-            "min_free": 0.0,
-        }
-    )
     conductors = ConductorPoints(points, HEAD * settings.min_height)
     found: list[MeasuredTower] = []
-    rough: list[DetectedTower] = []
-    for tower in measured_axes(
-        detected, offset, surroundings, tau, settings, settings.eps / 2, loose
-    ):
-        if all(np.hypot(tower.x - r.x, tower.y - r.y) > SAME_M for r in rough):
-            rough.append(tower)
-            found += _in_points(
-                tower, surroundings, points, conductors, offset, voxel_size, tau, settings
-            )
-    towers = _distinct(found)
-    return sorted((tower.moved(offset) for tower in towers), key=highest_probability)
+    for rough in rough_towers(detected, offset, surroundings, settings):
+        found += _in_points(
+            rough, surroundings, points, conductors, offset, voxel_size, tau, settings
+        )
+    towers = [tower.moved(offset) for tower in _distinct(found)]
+    return sorted(towers, key=lambda tower: (-tower.probability, tower.x, tower.y))
 
 
 def _in_points(
-    rough: DetectedTower,
+    rough: RoughTower,
     surroundings: Surroundings,
     points: Surroundings,
     conductors: ConductorPoints,

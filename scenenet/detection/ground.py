@@ -30,6 +30,10 @@ SEEN_M, SEEN = 0.5, 0.5
 """m, and the smallest share of the cells whose lowest point is this close to the plane. With fewer,
 the ground is not in the data, as in a tower that was cut out; its lowest points are the foot."""
 
+BELOW_M, BELOW = 4.0, 0.1
+"""m below the plane, and the largest share of the points so far below it. With more, the plane lies
+on conductors or crowns, and the ground is not in the data."""
+
 
 @dataclass(frozen=True)
 class Ground:
@@ -82,9 +86,11 @@ def fit_ground(offset: np.ndarray) -> Ground:
     there = residual[(distance <= NEAR_M) & (np.abs(residual) < SPREAD_M)]
     if len(there) >= 4:
         plane[2] += np.percentile(there, 35)
-    if (np.abs(z - design @ plane) < SEEN_M).mean() < SEEN:
-        every = near if len(near) else offset
-        plane[2] = np.percentile(every[:, 2] - middle - every[:, :2] @ plane[:2], 1)
+    every = near if len(near) else offset
+    above = every[:, 2] - middle - every[:, :2] @ plane[:2] - plane[2]
+    seen = (np.abs(z - design @ plane) < SEEN_M).mean()
+    if seen < SEEN or (above < -BELOW_M).mean() > BELOW:
+        plane[2] += np.percentile(above, 1)
     return Ground(middle + float(plane[2]), plane[:2])
 
 

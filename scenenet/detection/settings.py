@@ -19,7 +19,7 @@ class DetectionSettings(Settings):
         gt=0,
         le=1,
         description="share of the observer's value at tau from which voxels are detected. A tower "
-        "whose voxels all stay below tau needs twice `min_conductor` and `min_free`",
+        "whose voxels all stay below tau needs twice `min_conductor`",
     )
     eps: float = Field(
         6.0,
@@ -61,27 +61,6 @@ class DetectionSettings(Settings):
         "as a share of the distance from 3 to 20 m from the axis, or to the edge of the data. 0 "
         "accepts towers without conductors. Trees, cranes, lone poles and roofs have none. Below "
         "tau twice this length is needed",
-    )
-    min_free: float = Field(
-        0.5,
-        ge=0,
-        le=1,
-        description="in crops, smallest share of the body that nothing touches, for towers below "
-        "tau: it excludes trees under a line, whose crowns are wide",
-    )
-    body: float = Field(
-        2.1,
-        gt=0,
-        description="m around the axis, half the mean width of a tower (thesis 5.1.2): in crops, "
-        "every occupied voxel there belongs to the tower, detected or not",
-    )
-    beside_body: float = Field(
-        1.0, ge=0, description="m added to half the measured width of a wider tower in crops"
-    )
-    foot: float = Field(
-        1.0,
-        ge=0,
-        description="m above the ground; in crops, voxels below this are ground and plants",
     )
 
     @model_validator(mode="before")

@@ -176,7 +176,7 @@ def measure_structure(
     """The structure at an approximate axis, or None where no body stands free.
 
     Args:
-        points: (N, 3) m, within ``FAR + max(SCALES)`` of the axis in plan.
+        points: (N, 3) m, within ``candidates.SURROUNDINGS_M`` of the axis in plan.
         leaving: gives the conductors; only asked for where it matters.
         axis: (2,) m, approximate.
         base, height: m, elevation of the foot and height above it, approximate.

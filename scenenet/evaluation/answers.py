@@ -6,17 +6,18 @@ crop, for any source of probabilities: a model, boosted trees, or a constant.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from scenenet.dataset.crops import Crop
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
-from scenenet.detection.detect import surroundings_in
 from scenenet.detection.find import MeasuredTower, find_towers
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import places_of
+from scenenet.detection.surroundings import surroundings_in
+from scenenet.detection.survey_tower import SurveyTower
+from scenenet.evaluation.points import PointCounts
+from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.pointcloud.cloud import PointCloud
 
 Predict = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
@@ -24,54 +25,57 @@ Predict = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class LabelledCrop:
-    """A crop as points and as voxels.
-
-    Attributes:
-        crop: its towers.
-        cloud: its points.
-        sample: its voxels, on the grid of the data set.
-    """
-
-    crop: Crop
-    cloud: PointCloud
-    sample: VoxelSample
-
-
-@dataclass(frozen=True)
 class Answer:
     """What is tower in a crop.
 
     Attributes:
-        points: (N,) bool, of its points.
-        voxels: (V,) bool, of the voxels of its grid.
+        points: counts of its points that are in a tower.
+        voxels: (K,) flat indices, ascending, of the voxels of its grid that are tower.
         towers: (T, 4) m: x, y, elevation of the base and height of each tower, the last two NaN
             where they were not measured; None where no towers were looked for.
     """
 
-    points: np.ndarray
+    points: PointCounts
     voxels: np.ndarray
     towers: np.ndarray | None
 
     @classmethod
     def of_points(
-        cls, crop: LabelledCrop, points: np.ndarray, towers: np.ndarray | None = None
+        cls,
+        cloud: PointCloud,
+        grid: VoxelGrid,
+        in_tower: np.ndarray,
+        towers: np.ndarray | None = None,
     ) -> Answer:
-        """The answer with some points (N,) bool. A voxel with one of them is tower, as a voxel with
-        a labelled point is labelled."""
-        voxels = np.zeros(crop.sample.grid.n_voxels, bool)
-        voxels[crop.sample.grid.voxel_of(crop.cloud.xyz[points])] = True
-        return cls(points, voxels, towers)
+        """The answer with some points ``in_tower`` (N,) bool. A voxel with one of them is tower, as
+        a voxel with a labelled point is labelled."""
+        voxels = np.unique(grid.voxel_of(cloud.xyz[in_tower]))
+        return cls(PointCounts.of(cloud, in_tower), voxels, towers)
+
+    def among(self, n_voxels: int) -> np.ndarray:
+        """(V,) bool, which of all ``n_voxels`` voxels of the grid are tower."""
+        mask = np.zeros(n_voxels, bool)
+        mask[self.voxels] = True
+        return mask
+
+    def match(self, true: np.ndarray) -> TowerMatch | None:
+        """Match its towers with the labelled or true ones (T, 4), as ``dataset.crops.Crop`` has
+        them; None where no towers were looked for."""
+        return None if self.towers is None else match_towers(self.towers, true)
 
 
-def at_or_above_tau(crop: LabelledCrop, predict: Predict, tau: float) -> Answer:
+Answering = Callable[[VoxelSample], Answer]
+"""A crop on the grid of the data set -> what is tower in it."""
+
+
+def at_or_above_tau(cloud: PointCloud, sample: VoxelSample, predict: Predict, tau: float) -> Answer:
     """The answer without rules: the voxels that reach tau, the points in them, and a tower for each
     group of voxels that touch."""
-    probability, _ = predict(crop.sample)
-    voxels = probability >= tau
-    grid = crop.sample.grid
+    probability, _ = predict(sample)
+    voxels, grid = probability >= tau, sample.grid
     towers = group_places(voxels.reshape(grid.shape), grid)
-    return Answer(voxels[grid.voxel_of(crop.cloud.xyz)], voxels, towers)
+    points = PointCounts.of(cloud, voxels[grid.voxel_of(cloud.xyz)])
+    return Answer(points, np.flatnonzero(voxels), towers)
 
 
 def group_places(voxels: np.ndarray, grid: VoxelGrid) -> np.ndarray:
@@ -88,7 +92,8 @@ def group_places(voxels: np.ndarray, grid: VoxelGrid) -> np.ndarray:
 
 
 def with_rules(
-    crop: LabelledCrop,
+    cloud: PointCloud,
+    sample: VoxelSample,
     predict: Predict,
     tau: float,
     voxel_size: float,
@@ -97,10 +102,10 @@ def with_rules(
     """The answer of ``scenenet predict`` for a crop as a survey of its own.
 
     Args:
+        cloud, sample: the points of the crop, and its voxels on the grid of the data set.
         voxel_size: m, of the voxels in which the survey is predicted.
     """
-    cloud = crop.cloud
-    seen = voxelise(cloud, VoxelGrid.on_map(cloud.xyz, voxel_size), crop.sample.id)
+    seen = voxelise(cloud, VoxelGrid.on_map(cloud.xyz, voxel_size), sample.id)
     probability, _ = predict(seen)
     of_occupied = probability[seen.index]
     detected = of_occupied >= detection.threshold(tau)
@@ -114,7 +119,25 @@ def with_rules(
         tau,
         detection,
     )
-    return Answer.of_points(crop, _own_points(cloud.xyz, towers), places_of(towers))
+    own = _own_points(cloud.xyz, towers)
+    return Answer.of_points(cloud, sample.grid, own, places_of(towers))
+
+
+def rules_on(
+    clouds: Mapping[str, PointCloud],
+    predict: Predict,
+    tau: float,
+    voxel_size: float,
+    detection: DetectionSettings,
+) -> Answering:
+    """The answer ``with_rules`` for each crop whose points are in ``clouds`` by its id."""
+    return lambda sample: with_rules(clouds[sample.id], sample, predict, tau, voxel_size, detection)
+
+
+def places_of(towers: Sequence[MeasuredTower | SurveyTower]) -> np.ndarray:
+    """(T, 4) m: x, y, elevation of the base, and height of each tower."""
+    places = [[tower.x, tower.y, tower.base, tower.height] for tower in towers]
+    return np.array(places, float).reshape(-1, 4)
 
 
 def _own_points(xyz: np.ndarray, towers: list[MeasuredTower]) -> np.ndarray:

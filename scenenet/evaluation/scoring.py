@@ -5,20 +5,19 @@ The scores are defined in docs/development/architecture.md.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 
 from scenenet.core.progress import track
-from scenenet.dataset.crops import Crop
+from scenenet.dataset.crops import Crop, CropClouds
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_points import count_crop_points
-from scenenet.evaluation.crop_towers import detect_in_crop, match_crop
+from scenenet.evaluation.answers import Answer, Answering, Predict, rules_on
 from scenenet.evaluation.points import PointCounts
 from scenenet.evaluation.result import (
     Evaluation,
@@ -38,46 +37,51 @@ from scenenet.models.predictions import probabilities
 def evaluate(
     model: str | Path,
     voxel_manifests: Sequence[str | Path],
+    crop_manifests: Sequence[str | Path],
     split: str | Path,
     detection: DetectionSettings,
     part: str = "test",
-    crop_manifests: Sequence[str | Path] = (),
 ) -> Evaluation:
     """Scores of a tuned model on one part of the split (see ``score_predictions``).
 
+    Each crop is predicted as a survey of its own. It has no more surroundings than the tower is
+    high, so a tower at its edge may be missed that is found in the whole survey.
+
     Args:
-        crop_manifests: of the crop stores, for the scores of points; without them there are none.
+        voxel_manifests, crop_manifests: of the stores of voxels, and of the crops they are of.
     """
     trained, card = read_model(model)
-    ids = crops_in(split, part)
-    points = None
-    if crop_manifests:
-        points = count_crop_points(model, crop_manifests, ids, detection)
-    dataset = load(voxel_manifests, ids)
-    return replace(score(trained, card, dataset, detection, points), part=part)
+    answer = rules_on(
+        CropClouds(crop_manifests),
+        predictor(trained, card),
+        card.threshold(),
+        trained.observed_size(card.voxel_size),
+        detection,
+    )
+    dataset = load(voxel_manifests, crops_in(split, part))
+    return replace(score(trained, card, dataset, answer), part=part)
+
+
+def predictor(model: VoxelModel, card: ModelCard) -> Predict:
+    """The probabilities of a model."""
+    return lambda sample: probabilities(model, sample, card.measurement)
 
 
 def score(
     model: VoxelModel,
     card: ModelCard,
     dataset: Dataset,
-    detection: DetectionSettings,
-    points: Mapping[str, PointCounts] | None = None,
+    answer: Answering,
 ) -> Evaluation:
     """Scores of a model at its tau over all samples (see ``score_predictions``)."""
-
-    def predict(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
-        return probabilities(model, sample, card.measurement)
-
     return score_predictions(
         card.name,
         card.provenance.get("seed"),
         card.threshold(),
-        predict,
+        predictor(model, card),
         dataset,
-        detection,
+        answer,
         whole_towers=model.whole_towers,
-        points=points,
     )
 
 
@@ -85,29 +89,26 @@ def score_predictions(
     name: str,
     seed: int | None,
     tau: float,
-    predict: Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]],
+    predict: Predict,
     dataset: Dataset,
-    detection: DetectionSettings,
+    answer: Answering,
     *,
     whole_towers: bool = False,
-    points: Mapping[str, PointCounts] | None = None,
 ) -> Evaluation:
-    """Voxel and tower scores at tau over all samples, for any source of probabilities.
+    """Scores of voxels, points and towers over all samples, for any source of probabilities.
 
     Voxel scores come from the summed counts of all samples. All voxels of the grids count, empty
     ones included. Samples whose truth is known are scored against it as well.
 
     Args:
         name, seed: of the model.
-        predict: gives the probability (V,) and the label (V,) bool of every voxel of a sample.
-        whole_towers: whether ``voxel`` and ``per_sample`` count whole towers
-            (docs/method/detection.md).
-        points: counts of the points of each crop by its id; None if they were not counted.
+        answer: gives the whole towers of a crop (docs/method/detection.md).
+        whole_towers: whether ``voxel`` and ``per_sample`` count whole towers.
     """
-    tally = _Tally(tau, detection, whole_towers, points)
+    tally = _Tally(tau, whole_towers)
     pairs = list(zip(dataset.samples, dataset.crops, strict=True))
     for sample, crop in track(pairs, f"{name}: crops scored"):
-        tally.add(sample, crop, *predict(sample))
+        tally.add(sample, crop, *predict(sample), answer(sample))
     return tally.evaluation(name, seed)
 
 
@@ -176,34 +177,28 @@ class _Against:
 class _Tally:
     """Sums of the counts of samples, against the labels and against the truth."""
 
-    def __init__(
-        self,
-        tau: float,
-        detection: DetectionSettings,
-        whole_towers: bool,
-        points: Mapping[str, PointCounts] | None,
-    ) -> None:
-        self._tau, self._detection, self._whole_towers = tau, detection, whole_towers
-        self._of_points = points or {}
+    def __init__(self, tau: float, whole_towers: bool) -> None:
+        self._whole_towers = whole_towers
         self._labels, self._truth = _Against(tau, whole_towers), _Against(tau, whole_towers)
         self._points = PointCounts()
 
     def add(
-        self, sample: VoxelSample, crop: Crop, probability: np.ndarray, labelled: np.ndarray
+        self,
+        sample: VoxelSample,
+        crop: Crop,
+        probability: np.ndarray,
+        labelled: np.ndarray,
+        answer: Answer,
     ) -> None:
         """Count a sample with the probability (V,) and label (V,) bool of every voxel."""
-        found = detect_in_crop(sample, probability, self._tau, self._detection)
-        of_a_tower, _ = sample.spread(found.voxels)
-        points = self._of_points.get(sample.id)
-        self._points += points or PointCounts()
-        match = match_crop(found.towers, crop.towers)
-        counts = None if points is None else points.labels
-        self._labels.add(sample, probability, of_a_tower, labelled, match, counts)
+        of_a_tower = answer.among(len(probability))
+        match = answer.match(crop.towers) or TowerMatch.none()
+        self._points += answer.points
+        self._labels.add(sample, probability, of_a_tower, labelled, match, answer.points.labels)
         true = sample.truth()
         if true is not None and crop.true_towers is not None:
-            match = match_crop(found.towers, crop.true_towers)
-            counts = None if points is None else points.truth
-            self._truth.add(sample, probability, of_a_tower, true, match, counts)
+            match = answer.match(crop.true_towers) or TowerMatch.none()
+            self._truth.add(sample, probability, of_a_tower, true, match, answer.points.truth)
 
     def evaluation(self, name: str, seed: int | None) -> Evaluation:
         """The scores of all samples."""

@@ -14,8 +14,9 @@ from scenenet.core.progress import track
 from scenenet.core.unchanged import unchanged
 from scenenet.dataset.crops import Crop
 from scenenet.dataset.tower_places import TowerPlaces
+from scenenet.dataset.voxels import VoxelGrid
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import places_of
+from scenenet.evaluation.answers import Answer, places_of
 from scenenet.evaluation.points import PointCounts
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.pointcloud import PointCloud, iter_chunks
@@ -52,13 +53,14 @@ class SurveyScores:
 
     Attributes:
         points: of all points.
-        by_crop: of the points of each crop, by its id.
+        by_crop: the answer in each crop, by its id: its points, and the towers whose axis is in
+            it.
         towers: the towers found against the labelled ones.
         true_towers: the towers found against the true ones; None where the truth is not known.
     """
 
     points: PointCounts = field(default_factory=PointCounts)
-    by_crop: Mapping[str, PointCounts] = field(default_factory=dict)
+    by_crop: Mapping[str, Answer] = field(default_factory=dict)
     towers: TowerMatch = field(default_factory=TowerMatch.none)
     true_towers: TowerMatch | None = None
 
@@ -73,7 +75,10 @@ class SurveyScores:
 
 
 def score_survey(
-    survey: LabelledSurvey, model: str | Path, detection: DetectionSettings
+    survey: LabelledSurvey,
+    model: str | Path,
+    detection: DetectionSettings,
+    grids: Mapping[str, VoxelGrid],
 ) -> SurveyScores:
     """Predict a whole survey at the voxel size of the model, and score its towers and points.
 
@@ -81,12 +86,13 @@ def score_survey(
 
     Args:
         model: model file with tau.
+        grids: of the voxels of each crop, by its id.
 
     Raises:
         InputError: the survey, its truth or the model cannot be used.
     """
     counts, places = PointCounts(), TowerPlaces(survey.towers)
-    by_crop = {crop.id: PointCounts() for crop in survey.crops}
+    crops = [_CropTally(crop, survey.is_sample, grids[crop.id]) for crop in survey.crops]
     true_places = None if survey.true_towers is None else TowerPlaces(survey.true_towers)
     settings = PredictSettings()
     with predict_survey(survey.path, model, settings, detection) as prediction:
@@ -96,25 +102,53 @@ def score_survey(
             for chunk in track(chunks, f"{survey.path.name}: points scored"):
                 in_tower = prediction.look_up(chunk.xyz).tower_id > 0
                 counts += PointCounts.of(chunk, in_tower)
-                for crop in survey.crops:
-                    inside = _inside(chunk, crop, survey.is_sample)
-                    by_crop[crop.id] += PointCounts.of(chunk.select(inside), in_tower[inside])
+                for crop in crops:
+                    crop.add(chunk, in_tower)
                 places.add(chunk)
                 if true_places is not None and (true := chunk.with_truth) is not None:
                     true_places.add(true)
         found = places_of(prediction.towers)
     return SurveyScores(
         counts,
-        by_crop,
+        {tally.crop.id: tally.answer(found) for tally in crops},
         match_towers(found, places.places()),
         None if true_places is None else match_towers(found, true_places.places()),
     )
 
 
-def _inside(chunk: PointCloud, crop: Crop, is_sample: bool) -> np.ndarray:
-    """Positions of the points of a chunk that lie in a crop, as ``dataset.crops`` cuts it."""
-    if is_sample:
-        return np.arange(len(chunk))
-    offset = chunk.xyz[:, :2] - (crop.x, crop.y)
-    near = np.flatnonzero((np.abs(offset) <= crop.radius).all(axis=1))
-    return near[(offset[near] ** 2).sum(axis=1) <= crop.radius**2]
+@dataclass
+class _CropTally:
+    """What the prediction of a survey says about one of its crops.
+
+    Attributes:
+        crop: the crop.
+        is_sample: whether it is the whole TS40K sample.
+        grid: of its voxels.
+        points: counts of its points so far.
+        voxels: flat indices of the voxels with a point in a tower so far, ascending.
+    """
+
+    crop: Crop
+    is_sample: bool
+    grid: VoxelGrid
+    points: PointCounts = field(default_factory=PointCounts)
+    voxels: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+
+    def add(self, chunk: PointCloud, in_tower: np.ndarray) -> None:
+        """Count the points of a chunk that lie in the crop; ``in_tower`` (N,) bool is of all."""
+        inside = self._inside(chunk.xyz)
+        self.points += PointCounts.of(chunk.select(inside), in_tower[inside])
+        own = chunk.xyz[inside[in_tower[inside]]]
+        self.voxels = np.union1d(self.voxels, self.grid.voxel_of(own))
+
+    def answer(self, towers: np.ndarray) -> Answer:
+        """The answer in the crop, with those of the ``towers`` (T, 4) of the survey in it."""
+        return Answer(self.points, self.voxels, towers[self._inside(towers)])
+
+    def _inside(self, places: np.ndarray) -> np.ndarray:
+        """Rows of the places (N, 2 or more) m in the crop, as ``dataset.crops`` cuts it."""
+        if self.is_sample:
+            return np.arange(len(places))
+        offset = places[:, :2] - (self.crop.x, self.crop.y)
+        near = np.flatnonzero((np.abs(offset) <= self.crop.radius).all(axis=1))
+        return near[(offset[near] ** 2).sum(axis=1) <= self.crop.radius**2]

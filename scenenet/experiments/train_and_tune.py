@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scenenet.baselines import boosted_trees
 from scenenet.baselines.boosted_trees import BoostedTreesSettings
-from scenenet.dataset.voxels import VoxelSample
-from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import detect_in_crop
+from scenenet.dataset.voxels import VoxelSample, median_voxel_size
+from scenenet.evaluation.answers import Answer, Predict
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.metrics.voxel_scores import Confusion, confusion
 from scenenet.models.factory import new_model
@@ -27,9 +26,6 @@ from scenenet.training.gradient import LostTraining
 from scenenet.training.train import fit
 from scenenet.training.tuning import tuned_tau
 
-Predict = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
-"""Sample -> probabilities (V,) and labels (V,) bool of all voxels of its grid."""
-
 
 @dataclass(frozen=True)
 class TunedModel:
@@ -38,6 +34,7 @@ class TunedModel:
     Attributes:
         predict: probabilities and labels of a sample.
         tau: threshold.
+        voxel_size: m, of the voxels in which a survey is predicted.
         f05: F0.5 at tau on the crops that tau was chosen on; 0 if it is not defined.
         parameters: number of trained parameters.
         seconds: time of training and tuning.
@@ -45,6 +42,7 @@ class TunedModel:
 
     predict: Predict
     tau: float
+    voxel_size: float
     f05: float
     parameters: int
     seconds: float
@@ -57,14 +55,17 @@ class TunedModel:
         return total
 
     def score_towers(
-        self, samples: Iterable[VoxelSample], detection: DetectionSettings
+        self, samples: Iterable[VoxelSample], answers: Mapping[str, Answer]
     ) -> Confusion:
-        """Counts for the voxels of the whole towers that are found (docs/method/detection.md)."""
+        """Counts for the voxels of the whole towers that are found.
+
+        Args:
+            answers: with rules, by the id of the sample.
+        """
         total = Confusion()
         for sample in samples:
-            probability, truth = self.predict(sample)
-            found = detect_in_crop(sample, probability, self.tau, detection)
-            total += confusion(sample.spread(found.voxels)[0], truth, 0.5)
+            true = sample.labels()
+            total += Confusion.of(answers[sample.id].among(len(true)), true)
         return total
 
     def curve(self, samples: Iterable[VoxelSample]) -> ThresholdCurve:
@@ -105,13 +106,13 @@ def train_model(
     seed: int,
 ) -> TunedModel:
     """Train a SCENE-Net or a CNN as ``train_and_tune``; if it diverges, it detects nothing."""
-    begin = time.perf_counter()
+    begin, size = time.perf_counter(), median_voxel_size(training)
     try:
         model, _ = fit(training, [], settings, seed)
     except LostTraining as error:
         print(error, file=sys.stderr)
         n, seconds = new_model(settings, seed).n_parameters(), time.perf_counter() - begin
-        return TunedModel(_nothing, float(THRESHOLDS[-1]), 0.0, n, seconds)
+        return TunedModel(_nothing, float(THRESHOLDS[-1]), size, 0.0, n, seconds)
     others = training if validation else ()
     tau, curve = tuned_tau(model, validation or training, others, settings.measurement)
     counts = curve.at(tau)
@@ -120,7 +121,12 @@ def train_model(
         return probabilities(model, sample, settings.measurement)
 
     return TunedModel(
-        predict, tau, counts.decisive, model.n_parameters(), time.perf_counter() - begin
+        predict,
+        tau,
+        model.observed_size(size),
+        counts.decisive,
+        model.n_parameters(),
+        time.perf_counter() - begin,
     )
 
 
@@ -141,5 +147,11 @@ def train_boosted_trees(
     else:
         model, curve = boosted_trees.fit_and_tune(training, settings, seed)
     seconds = time.perf_counter() - begin
-    f05 = curve.best()[1].decisive
-    return TunedModel(model.probabilities, model.threshold(), f05, model.n_parameters(), seconds)
+    return TunedModel(
+        model.probabilities,
+        model.threshold(),
+        median_voxel_size(training),
+        curve.best()[1].decisive,
+        model.n_parameters(),
+        seconds,
+    )

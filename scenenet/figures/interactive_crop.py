@@ -59,7 +59,8 @@ def write_interactive_crop(
     """
     from scenenet.dataset.voxels import VoxelSettings, voxelise
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.evaluation.crop_towers import detect_in_crop
+    from scenenet.evaluation.answers import with_rules
+    from scenenet.evaluation.scoring import predictor
     from scenenet.figures.selection import champion_of, crop_cloud, ranked, voxel_classes
     from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
     from scenenet.models.model_file import read_model
@@ -73,10 +74,12 @@ def write_interactive_crop(
     voxels = voxelise(cloud, settings.grid(cloud.xyz), sample.id)
     names = voxel_classes(cloud.roles, voxels.grid.voxel_of(cloud.xyz), voxels.index)
     probability, truth = probabilities(trained, voxels, card.measurement)
-    tau = card.threshold()
+    tau, size = card.threshold(), trained.observed_size(card.voxel_size)
+    rules = detection or DetectionSettings()
+    answer = with_rules(cloud, voxels, predictor(trained, card), tau, size, rules)
+    whole = answer.among(len(truth))
     curve = ThresholdCurve.of(probability, truth)
     taus = THRESHOLDS.astype(probability.dtype)
-    whole = detect_in_crop(voxels, probability, tau, detection or DetectionSettings()).voxels
     made = InteractiveCrop(
         crop=sample.id,
         rank=rank,
@@ -93,8 +96,8 @@ def write_interactive_crop(
         true=tuple(curve.true.tolist()),
         false=tuple(curve.false.tolist()),
         tau_step=int(np.argmin(np.abs(THRESHOLDS - tau))),
-        whole=whole,
-        whole_scores=_scores(voxels.spread(whole)[0], truth),
+        whole=whole[voxels.index],
+        whole_scores=_scores(whole, truth),
     )
     write_json(out, made.to_json())
     return made
@@ -102,9 +105,9 @@ def write_interactive_crop(
 
 def _scores(whole: np.ndarray, truth: np.ndarray) -> WholeTowerScores:
     """Of (V,) voxels of whole towers among all voxels of the grid."""
-    from scenenet.metrics.voxel_scores import confusion
+    from scenenet.metrics.voxel_scores import Confusion
 
-    scores = confusion(whole, truth, 0.5).scores()
+    scores = Confusion.of(whole, truth).scores()
     return WholeTowerScores(scores["precision"], scores["recall"], scores["f05"])
 
 

@@ -47,15 +47,11 @@ def ranked(champion: SeedResult, rank: str) -> SampleScores:
 
 def crop_cloud(results: Results, crop: str) -> PointCloud:
     """The points of the test crop with that id."""
-    from scenenet.dataset.zarr_store import StoreReader
-    from scenenet.pointcloud import PointCloud, class_scheme
+    from scenenet.dataset.crops import CropClouds
 
     split = read_table(results.folder / "split" / "split.csv").astype({"crop": str})
     survey = split.loc[split["crop"] == crop, "survey"].iloc[0]
-    reader = StoreReader(results.folder / "crops" / survey / "manifest.json")
-    arrays = reader.get(crop)
-    scheme = class_scheme(reader.manifest["codes"])
-    return PointCloud(arrays["xyz"], arrays["classification"], scheme)
+    return CropClouds([results.folder / "crops" / survey / "manifest.json"])[crop]
 
 
 def voxel_classes(groups: np.ndarray, voxel: np.ndarray, index: np.ndarray) -> np.ndarray:

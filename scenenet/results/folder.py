@@ -69,9 +69,9 @@ class SeedResult:
         return None if self.tuning is None else self.tuning.validation
 
     @property
-    def decisive(self) -> float:
-        """F0.5 on the validation crops, to choose by; 0 before tuning."""
-        return 0.0 if self.validation is None else self.validation.decisive
+    def decisive(self) -> tuple[float, float]:
+        """What to choose by on the validation crops (``Tuning.decisive``); 0 before tuning."""
+        return (0.0, 0.0) if self.tuning is None else self.tuning.decisive
 
     @property
     def epochs(self) -> int | None:
@@ -154,7 +154,7 @@ class Results:
         return [result for result in self.trained if result.model == model]
 
     def champion(self, model: str) -> SeedResult | None:
-        """The seed with the highest F0.5 on the validation crops, the first one in a tie."""
+        """The seed that is best on the validation crops, the first one in a tie."""
         tuned = [result for result in self.of_model(model) if result.tuning is not None]
         return max(tuned, key=lambda result: result.decisive, default=None)
 

@@ -6,14 +6,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, digest
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
-from scenenet.dataset.voxels import VoxelSample, VoxelSettings
+from scenenet.dataset.voxels import VoxelSample, VoxelSettings, median_voxel_size
 from scenenet.models.base import VoxelModel
 from scenenet.models.model_file import ModelCard, write_model
 from scenenet.models.settings import ModelSettings
@@ -69,7 +68,7 @@ def card_of(
         measurement=model.measurement,
         fit=grid.fit,
         resolution=grid.resolution,
-        voxel_size=float(np.median([s.grid.voxel_size for s in training.samples])),
+        voxel_size=median_voxel_size(training.samples),
         provenance={
             "seed": seed,
             "data": digest(sorted(training.content)),

@@ -3,40 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
-from scenenet.core.files import write_json
-from scenenet.dataset.split import crops_in
-from scenenet.dataset.voxel_cache import load
 from scenenet.dataset.voxels import Measurement, VoxelSample
 from scenenet.metrics.threshold_curve import ThresholdCurve, curve_columns
 from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.base import VoxelModel
-from scenenet.models.model_file import ModelCard, read_model, write_model
+from scenenet.models.model_file import ModelCard
 from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import TuningSettings
 from scenenet.training.tuning_result import TriedSize, Tuning
-
-
-def tune(
-    model: str | Path,
-    voxel_manifests: Sequence[str | Path],
-    split: str | Path,
-    settings: TuningSettings,
-    out_model: str | Path,
-    out_json: str | Path,
-) -> Tuning:
-    """Choose tau and kernel size by F0.5 on the validation part; write the tuned model and what was
-    found (``Tuning.to_json``)."""
-    trained, card = read_model(model)
-    samples = load(voxel_manifests, crops_in(split, "validation")).samples
-    learnt: Sequence[VoxelSample] = ()
-    if trained.tau_from_training:
-        learnt = load(voxel_manifests, crops_in(split, "train")).samples
-    tuned, card, result = choose(trained, card, samples, settings, learnt)
-    write_model(out_model, tuned, card)
-    write_json(out_json, result.to_json())
-    return result
 
 
 def choose(
@@ -46,7 +21,7 @@ def choose(
     settings: TuningSettings,
     learnt: Sequence[VoxelSample] = (),
 ) -> tuple[VoxelModel, ModelCard, Tuning]:
-    """The model at its best kernel size, its card with tau, and the result of ``tune``.
+    """The model at its best kernel size, its card with tau, and what was found.
 
     Args:
         learnt: crops that it was trained on. For a SCENE-Net in metres, tau is chosen on these as

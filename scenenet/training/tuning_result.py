@@ -39,6 +39,8 @@ class Tuning:
         validation: scores on the validation crops at the chosen tau.
         curve: precision, recall and f05 at every tau, and tau (``curve_columns``).
         kernel_sizes: all sizes that were tried, that of the training first.
+        whole_towers: scores of the voxels of whole towers on the validation crops, found at the
+            chosen tau; None for a model that gives voxels at or above tau.
     """
 
     model: str
@@ -46,6 +48,14 @@ class Tuning:
     validation: VoxelScores
     curve: Mapping[str, Sequence[float | None]]
     kernel_sizes: tuple[TriedSize, ...]
+    whole_towers: VoxelScores | None = None
+
+    @property
+    def decisive(self) -> tuple[float, float]:
+        """What the seed is chosen by: F0.5 of the answer that users get, then that of the voxels at
+        or above tau."""
+        observer = self.validation.decisive
+        return observer if self.whole_towers is None else self.whole_towers.decisive, observer
 
     @property
     def tau(self) -> float:
@@ -61,6 +71,7 @@ class Tuning:
             "validation": asdict(self.validation),
             "curve": dict(self.curve),
             "kernel_sizes": [tried.to_json() for tried in self.kernel_sizes],
+            "whole_towers": None if self.whole_towers is None else asdict(self.whole_towers),
         }
 
     @classmethod
@@ -77,4 +88,6 @@ class Tuning:
             del scores["kernel_size"]
             tried.append(TriedSize(size, VoxelScores(**scores)))
         size = tuple(data["kernel_size"])
-        return cls(data["model"], size, validation, data["curve"], tuple(tried))
+        whole = data["whole_towers"]
+        towers = None if whole is None else VoxelScores(**whole)
+        return cls(data["model"], size, validation, data["curve"], tuple(tried), towers)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from fixtures.scenes import PLACE
 
 from scenenet.synthetic.scene.towers import KINDS, place, sample
 
@@ -77,6 +78,78 @@ def make_tower_scene(
     codes = np.concatenate([np.full(len(points), code) for points, code in parts])
     above = (codes != TOWER) | (xyz[:, 2] >= slope * xyz[:, 0]) | (not ground)
     return Scene(xyz[above] + foot, codes[above], np.array(foot))
+
+
+class Points:
+    """Objects as points, placed by hand around ``PLACE``; the ground is at its elevation."""
+
+    place = PLACE
+
+    @staticmethod
+    def at(places: np.ndarray) -> np.ndarray:
+        """Positions (M, 3) m relative to ``PLACE``, with the noise of a scanner."""
+        return (
+            places + 0.02 * np.random.default_rng(len(places)).standard_normal(places.shape) + PLACE
+        )
+
+    @classmethod
+    def ground(cls, radius: float = 30.0, slope: float = 0.0) -> np.ndarray:
+        """A disc of ground that rises by ``slope`` m per metre towards the east."""
+        x, y = (side.ravel() for side in np.meshgrid(*[np.arange(-radius, radius, 0.5)] * 2))
+        places = np.column_stack([x, y, slope * x])
+        return cls.at(places[np.hypot(x, y) <= radius])
+
+    @classmethod
+    def column(cls, x: float, y: float, low: float, high: float) -> np.ndarray:
+        """Points above one another, from ``low`` to ``high`` m, on the axis of a voxel."""
+        z = np.arange(low, high, 0.1)
+        return cls.at(np.column_stack([np.full(len(z), x + 0.5), np.full(len(z), y + 0.5), z]))
+
+    @classmethod
+    def conductors(
+        cls,
+        bearing: float,
+        height: float,
+        x: float = 0.0,
+        y: float = 0.0,
+        end: float = 28.0,
+        beside: tuple[float, ...] = (-1.5, 0.0, 1.5),
+    ) -> np.ndarray:
+        """Conductors from the voxel at (x, y) towards a bearing in degrees, falling by 1 m."""
+        s = np.arange(0, end, 0.25)
+        east, north = np.sin(np.radians(bearing)), np.cos(np.radians(bearing))
+        x, y = x + 0.5, y + 0.5
+        lines = [
+            np.column_stack(
+                [x + s * east + t * north, y + s * north - t * east, height - s / max(end, 1)]
+            )
+            for t in beside
+        ]
+        return cls.at(np.concatenate(lines))
+
+    @classmethod
+    def tree(cls, x: float, y: float, height: float, seed: int = 0) -> np.ndarray:
+        """A conifer: a cone of points, widest at a quarter of its height, and its trunk."""
+        rng = np.random.default_rng(seed)
+        z = rng.uniform(height / 4, height, 1500)
+        away = 4 * (1 - z / height) * np.sqrt(rng.uniform(0, 1, 1500))
+        turn = rng.uniform(0, 2 * np.pi, 1500)
+        crown = np.column_stack([x + away * np.cos(turn), y + away * np.sin(turn), z])
+        return cls.together(cls.at(crown), cls.column(x, y, 1, height))
+
+    @classmethod
+    def block(cls, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Points that fill the space between the given coordinates."""
+        return cls.at(np.column_stack([side.ravel() for side in np.meshgrid(x, y, z)]))
+
+    @staticmethod
+    def together(*parts: np.ndarray) -> np.ndarray:
+        return np.concatenate(parts)
+
+
+@pytest.fixture(scope="session")
+def points() -> type[Points]:
+    return Points
 
 
 @pytest.fixture(scope="session")

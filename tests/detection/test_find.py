@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.detection.detect import surroundings_in
 from scenenet.detection.find import find_towers
 from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.surroundings import surroundings_in
 
 TAU, SIZE = 0.5, 1.0
 

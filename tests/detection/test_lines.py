@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scenenet.detection.conductors import ConductorPoints
-from scenenet.detection.detect import surroundings_in
 from scenenet.detection.lines import points_on_lines
+from scenenet.detection.surroundings import surroundings_in
 
 HEIGHT = 20.0
 AXIS = np.array([100.3, 200.7])

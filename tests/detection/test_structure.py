@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scenenet.detection.conductors import ConductorPoints
-from scenenet.detection.detect import surroundings_in
 from scenenet.detection.structure import BodyTests, measure_structure
+from scenenet.detection.surroundings import surroundings_in
 
 ANY = BodyTests(9.0, 0.75, 1 / 3)
 

@@ -12,11 +12,12 @@ from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.answers import (
     Answer,
-    LabelledCrop,
     at_or_above_tau,
     group_places,
     with_rules,
 )
+from scenenet.evaluation.points import PointCounts
+from scenenet.experiments.components.sources import LabelledCrop
 from scenenet.models.model_file import write_model
 from scenenet.models.predictions import probabilities
 from scenenet.prediction.predict import predict_survey
@@ -39,10 +40,10 @@ def crop(scene) -> LabelledCrop:
 def test_the_answer_with_rules_is_that_of_predict(crop, shift, pole_finder, tmp_path):
     model, card = pole_finder
     cloud = replace(crop.cloud, xyz=crop.cloud.xyz + shift)
-    moved = LabelledCrop(crop.crop, cloud, crop.sample)
+    grid = VoxelGrid.cube(cloud.xyz, 32)
     answer = with_rules(
-        moved, lambda s: probabilities(model, s, card.measurement), card.threshold(), 1.0,
-        LONE_POLES,
+        cloud, voxelise(cloud, grid, "crop"), lambda s: probabilities(model, s, card.measurement),
+        card.threshold(), 1.0, LONE_POLES,
     )  # fmt: skip
     write_model(tmp_path / "model.json", model, card)
     np.save(tmp_path / "crop.npy", np.column_stack([cloud.xyz, cloud.classification]))
@@ -51,7 +52,8 @@ def test_the_answer_with_rules_is_that_of_predict(crop, shift, pole_finder, tmp_
         own = prediction.look_up(cloud.xyz).tower_id > 0
         places = [(tower.x, tower.y, tower.base, tower.height) for tower in prediction.towers]
     assert len(places) == 2 and own.sum() > 300
-    assert np.array_equal(answer.points, own)
+    assert answer.points == PointCounts.of(cloud, own)
+    assert np.array_equal(answer.voxels, np.unique(grid.voxel_of(cloud.xyz[own])))
     assert answer.towers == pytest.approx(np.array(places), abs=1e-3)
 
 
@@ -59,23 +61,22 @@ def test_rules_alone_find_poles_and_not_the_tree(crop):
     def everywhere(sample):
         return sample.spread(np.ones(len(sample.index), np.float32))
 
-    answer = with_rules(crop, everywhere, 0.5, 1.0, LONE_POLES)
+    answer = with_rules(crop.cloud, crop.sample, everywhere, 0.5, 1.0, LONE_POLES)
     apart = np.hypot(*(answer.towers[:, None, :2] - crop.crop.towers[None, :, :2]).T)
     assert apart.shape == (2, 2) and (apart.min(axis=0) < 0.3).all()
-    assert (answer.points & crop.cloud.is_tower).sum() > 0.9 * answer.points.sum()
+    assert answer.points.labels.precision > 0.9
 
 
 def test_without_rules_voxels_give_their_points_and_groups_are_towers(crop):
     def labels(sample):
         return sample.spread(np.where(sample.tower, 0.6, 0.4).astype(np.float32))
 
-    answer = at_or_above_tau(crop, labels, 0.5)
-    _, labelled = crop.sample.spread(np.zeros(len(crop.sample.index), np.float32))
-    assert np.array_equal(answer.voxels, labelled)
-    assert (answer.points | ~crop.cloud.is_tower).all()  # every labelled point is in such a voxel
+    answer = at_or_above_tau(crop.cloud, crop.sample, labels, 0.5)
+    assert np.array_equal(answer.voxels, crop.sample.tower_index())
+    assert answer.points.labels.recall == 1.0  # every labelled point is in such a voxel
     apart = np.hypot(*(answer.towers[:, None, :2] - crop.crop.towers[None, :, :2]).T)
     assert apart.shape == (2, 2) and (apart.min(axis=0) < 0.5).all()
-    assert len(at_or_above_tau(crop, labels, 0.7).towers) == 0
+    assert len(at_or_above_tau(crop.cloud, crop.sample, labels, 0.7).towers) == 0
 
 
 def test_voxels_that_touch_at_a_corner_are_one_group():
@@ -88,7 +89,7 @@ def test_voxels_that_touch_at_a_corner_are_one_group():
 
 
 def test_a_voxel_with_a_point_of_the_answer_is_tower(crop):
-    answer = Answer.of_points(crop, crop.cloud.is_tower)
-    _, labelled = crop.sample.spread(np.zeros(len(crop.sample.index), np.float32))
-    assert np.array_equal(answer.voxels, labelled)
-    assert answer.towers is None
+    answer = Answer.of_points(crop.cloud, crop.sample.grid, crop.cloud.is_tower)
+    assert np.array_equal(answer.voxels, crop.sample.tower_index())
+    assert np.array_equal(answer.among(crop.sample.grid.n_voxels), crop.sample.labels())
+    assert answer.towers is None and answer.match(crop.crop.towers) is None

@@ -10,11 +10,12 @@ import pytest
 import torch
 
 from scenenet.core.errors import InputError
-from scenenet.dataset.crops import Crop
-from scenenet.dataset.voxel_cache import Dataset
-from scenenet.dataset.voxels import VoxelGrid, VoxelSample
+from scenenet.dataset.crops import Crop, CropClouds, CropSettings, Truth, cut_crops
+from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
+from scenenet.dataset.voxel_cache import Dataset, build
+from scenenet.dataset.voxels import VoxelGrid, VoxelSample, VoxelSettings
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.crop_towers import detect_in_crop
+from scenenet.evaluation.answers import Answer
 from scenenet.evaluation.points import PointCounts
 from scenenet.evaluation.result import Evaluation, PointScores
 from scenenet.evaluation.scoring import evaluate, score, score_predictions
@@ -23,6 +24,9 @@ from scenenet.models.base import VoxelModel
 from scenenet.models.factory import new_model
 from scenenet.models.model_file import ModelCard, write_model
 from scenenet.models.settings import MetricSettings, ModelSettings
+from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.settings import PredictSettings
+from scenenet.synthetic import SyntheticSettings, make_survey
 
 SHAPE = (12, 3, 30)
 GRID = VoxelGrid((0.0, 0.0, 0.0), 1.0, SHAPE)
@@ -73,14 +77,29 @@ def crop(number: int, *xs: int, empty=()):
     return sample, Crop(sample.id, 15.0, 1.5, 15.0, towers)
 
 
-def scores(model: Mock, *crops, tau: float = 0.5):
+def nothing(sample: VoxelSample) -> Answer:
+    """The answer without towers."""
+    return Answer(PointCounts(), np.empty(0, np.int64), np.empty((0, 4)))
+
+
+def towers_at(*xs: int):
+    """The answer with a tower at each of ``xs``."""
+    voxels = sorted(np.ravel_multi_index(v, SHAPE) for x in xs for v in pole(x))
+    places = np.array([[x + 0.5, 1.5, np.nan, np.nan] for x in xs]).reshape(-1, 4)
+    return lambda sample: Answer(PointCounts(), np.array(voxels, np.int64), places)
+
+
+def scores(model: Mock, *crops, tau: float = 0.5, answer=nothing):
     samples, of_samples = zip(*crops, strict=True)
     dataset = Dataset(list(samples), list(of_samples), "edp", [])
-    return score(model, CARD.with_tau(tau), dataset, LONE_POLES)
+    return score(model, CARD.with_tau(tau), dataset, answer)
 
 
 def test_a_perfect_model_scores_one():
-    result = scores(Mock(pole(5), pole(15)), crop(1, 5), crop(2, 15))
+    result = scores(
+        Mock(pole(5), pole(15)), crop(1, 5), crop(2, 15),
+        answer=lambda sample: towers_at({"crop-1": 5, "crop-2": 15}[sample.id])(sample),
+    )  # fmt: skip
     for name in ("precision", "recall", "f05", "iou_tower", "miou"):
         assert getattr(result.voxel, name) == 1.0
     assert result.to_json()["towers"] == {
@@ -121,7 +140,6 @@ def test_empty_voxels_count_except_in_the_occupied_scores():
     result = scores(Mock(pole(5) | ghost), crop(1, 5))
     assert result.voxel.precision == 12 / 16
     assert result.voxel_occupied.precision == 1.0
-    assert result.towers.n_predicted == 1
 
 
 def test_a_voxel_at_tau_is_detected():
@@ -130,7 +148,7 @@ def test_a_voxel_at_tau_is_detected():
 
 
 def test_a_detected_tower_far_from_every_labelled_one_is_false():
-    result = scores(Mock(pole(5) | pole(15)), crop(1, 5, 25))
+    result = scores(Mock({}), crop(1, 5, 25), answer=towers_at(5, 15))
     assert result.to_json()["towers"] == {
         "precision": 0.5, "recall": 0.5, "median_error_m": 0.0, "median_height_error_m": None,
         "median_base_error_m": None, "n_true": 2, "n_predicted": 2,
@@ -160,13 +178,15 @@ def test_scores_are_plain_numbers():
 def test_a_model_without_tau_cannot_be_scored():
     untuned = CARD.model_copy(update={"tau": None})
     with pytest.raises(InputError, match="no detection threshold"):
-        score(Mock(), untuned, Dataset([], [], "edp", []), LONE_POLES)
+        score(Mock(), untuned, Dataset([], [], "edp", []), nothing)
 
 
 def test_only_the_selected_part_is_scored(chain, pole_finder, tmp_path):
     write_model(tmp_path / "m.json", *pole_finder)
     found = {
-        part: evaluate(tmp_path / "m.json", [chain.voxels], chain.split, LONE_POLES, part)
+        part: evaluate(
+            tmp_path / "m.json", [chain.voxels], [chain.crops], chain.split, LONE_POLES, part
+        )
         for part in ("train", "validation", "test")
     }
     assert {p: r.voxel.n_samples for p, r in found.items()} == {
@@ -188,39 +208,19 @@ def test_detected_towers_count_whole_and_other_voxels_do_not():
         volume = np.zeros(SHAPE, np.float32)
         for place, probability in half.items():
             volume[place] = probability
-        truth = np.zeros(volume.size, bool)
-        truth[sample.tower_index()] = True
-        return volume.reshape(-1), truth
+        return volume.reshape(-1), sample.labels()
 
     def counted(**how):
-        return score_predictions("m", 0, 0.5, predict, dataset, LONE_POLES, **how)
+        return score_predictions("m", 0, 0.5, predict, dataset, towers_at(5), **how)
 
     observer, towers = counted(), counted(whole_towers=True)
     assert observer.voxel == observer.voxel_observer == towers.voxel_observer
     assert towers.voxel == towers.voxel_towers == observer.voxel_towers
     assert (observer.voxel.recall, observer.voxel.precision) == (6 / 12, 6 / 8)
-    # The voxel on the ground does not belong to the body.
-    assert (towers.voxel.recall, towers.voxel.precision) == (11 / 12, 1.0)
+    assert (towers.voxel.recall, towers.voxel.precision) == (1.0, 1.0)
     [sample] = towers.per_sample
-    assert (sample.tp, sample.fp, sample.fn) == (11, 0, 1)
+    assert (sample.tp, sample.fp, sample.fn) == (12, 0, 0)
     assert sample.f05_observer < sample.f05_towers == sample.f05
-
-
-def test_towers_are_found_in_voxels_finer_than_the_points_are_dense():
-    """A pole with a point every 1.25 m, in voxels of 0.25 m."""
-    grid = VoxelGrid((0.0, 0.0, 0.0), 0.25, (64, 48, 120))
-    ground = [(0, y, x) for y in range(0, 48, 4) for x in range(0, 120, 4)]
-    body = [(z, 24, 60) for z in range(5, 62, 5)]
-    index = np.unique([np.ravel_multi_index(v, grid.shape) for v in [*ground, *body]])
-    true = np.isin(index, [np.ravel_multi_index(v, grid.shape) for v in body])
-    sample = VoxelSample("c", grid, index.astype(np.int32), np.ones_like(index, np.int32), true)
-    probability = np.zeros(grid.n_voxels, np.float32)
-    probability[sample.index[true][3:]] = 1.0  # not its foot
-    found = detect_in_crop(sample, probability, 0.5, LONE_POLES)
-    [tower] = found.towers
-    assert (tower.x, tower.y) == pytest.approx((15.1, 6.1), abs=0.5)
-    assert tower.height == pytest.approx(15.5, abs=1.0)
-    np.testing.assert_array_equal(found.voxels, true)
 
 
 @pytest.mark.parametrize("whole", [True, False])
@@ -228,7 +228,7 @@ def test_a_model_in_metres_predicts_whole_towers_by_default(whole):
     settings = ModelSettings(
         name="m", kind="scenenet", protocol="operational", metric=MetricSettings(whole_towers=whole)
     )
-    result = score(new_model(settings, 0), CARD, Dataset([], [], "edp", []), LONE_POLES)
+    result = score(new_model(settings, 0), CARD, Dataset([], [], "edp", []), nothing)
     assert result.whole_towers is whole
 
 
@@ -245,7 +245,9 @@ def with_truth(number: int, labelled: tuple[int, ...], true: tuple[int, ...]):
 
 def test_every_score_is_given_against_the_labels_and_against_the_truth():
     """The model finds the pole at 5 and none other; the label at 15 is wrong."""
-    found = scores(Mock(pole(5), pole(5)), with_truth(1, (5, 15), (5,)), crop(2, 15))
+    found = scores(
+        Mock(pole(5), pole(5)), with_truth(1, (5, 15), (5,)), crop(2, 15), answer=towers_at(5)
+    )
     assert (found.voxel.precision, found.voxel.recall) == (0.5, pytest.approx(1 / 3))
     assert found.voxel.n_samples == 2
     truth = found.truth
@@ -276,9 +278,53 @@ def test_points_of_crops_are_summed_against_labels_and_truth():
     }
     samples, crops = zip(with_truth(1, (5, 15), (5,)), crop(2, 15), strict=True)
     dataset = Dataset(list(samples), list(crops), "edp", [])
-    found = score(Mock(pole(5), pole(5)), CARD, dataset, LONE_POLES, points)
+    found = score(
+        Mock(pole(5), pole(5)), CARD, dataset,
+        lambda sample: replace(nothing(sample), points=points[sample.id]),
+    )  # fmt: skip
     assert found.points == PointScores(4 / 10, 4 / 9, 4 / 15, n_true=9, n_predicted=10)
     assert found.truth.points == PointScores(3 / 5, 1.0, 3 / 5, n_true=3, n_predicted=5)
     assert found.labels_against_truth == PointScores(3 / 9, 1.0, 3 / 9, n_true=3, n_predicted=9)
     assert [s.points.n_predicted for s in found.per_sample] == [5, 5]
     assert found.per_sample[1].points.recall is None  # nothing is labelled
+
+
+@pytest.fixture(scope="module")
+def line(tmp_path_factory, pole_finder):
+    """Crops, voxels and split of a synthetic line with its truth, and a model."""
+    folder = tmp_path_factory.mktemp("crops")
+    survey, truth = folder / "line.laz", folder / "line.truth.laz"
+    make_survey(SyntheticSettings(towers=3, seed=5, density=20), survey, truth=truth)
+    towers, true = (survey_towers(path, "edp", TowerSettings()).towers for path in (survey, truth))
+    cut_crops("line", survey, "edp", towers, CropSettings(), folder / "crops.zarr.zip",
+              folder / "crops.json", Truth(truth, true))  # fmt: skip
+    grid = VoxelSettings(fit="metric", voxel_size=1.0)
+    build(folder / "crops.json", grid, folder / "voxels.zarr.zip", folder / "voxels.json")
+    rows = ["line,line-0001,train", "line,line-0002,test", "line,line-0003,test"]
+    (folder / "split.csv").write_text("\n".join(["survey,crop,part", *rows]))
+    write_model(folder / "model.json", *pole_finder)
+    return folder
+
+
+def test_each_crop_of_the_test_part_is_scored_as_a_survey_of_its_own(line, tmp_path):
+    model = line / "model.json"
+    result = evaluate(
+        model, [line / "voxels.json"], [line / "crops.json"], line / "split.csv", LONE_POLES
+    )
+    total = PointCounts()
+    for name, cloud in CropClouds([line / "crops.json"]).items():
+        if name == "line-0001":
+            continue
+        np.save(tmp_path / "crop.npy", np.column_stack([cloud.xyz, cloud.classification]))
+        files = tmp_path / "crop.npy", model
+        with predict_survey(*files, PredictSettings(), LONE_POLES) as prediction:
+            in_tower = prediction.look_up(cloud.xyz).tower_id > 0
+        assert in_tower.sum() > 100
+        total += PointCounts.of(cloud, in_tower)
+    assert result.points == PointScores.of(total.labels)
+    assert result.truth.points == PointScores.of(total.truth)
+    assert result.labels_against_truth == PointScores.of(total.labels_against_truth)
+    assert result.truth.voxel.n_samples == result.voxel.n_samples == 2
+    assert result.truth.towers.n_true == result.towers.n_true == 2
+    assert result.truth.towers.median_height_error_m is not None
+    assert result.leading is result.truth

@@ -163,9 +163,9 @@ def test_the_points_of_the_tower_carry_its_number(predicted):
     assert set(np.unique(points["tower_id"])) == {0, 1}
     assert of_tower.sum() == predicted.towers["features"][0]["properties"]["points"] > 100
     away = np.hypot(points.x[of_tower] - POLE[0], points.y[of_tower] - POLE[1])
-    assert away.max() < LONE_POLES.body + 1.0
+    assert away.max() < 0.6
     # Detected or not: the response at the foot of a pole is low.
-    above_foot = np.asarray(points.z) > 100 + LONE_POLES.foot + 1.0
+    above_foot = np.asarray(points.z) > 102
     pole = (np.asarray(points.classification) == 15) & above_foot
     assert of_tower[pole].all()
     assert (points["tower_probability"][pole] < LONE_POLES.threshold(0.7)).any()

@@ -6,17 +6,16 @@ import json
 
 import pytest
 
-from scenenet.core.files import read_json
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.metrics.threshold_curve import THRESHOLDS
 from scenenet.metrics.voxel_scores import VoxelScores, confusion
 from scenenet.models.cnn import CNN
-from scenenet.models.model_file import read_model, write_model
+from scenenet.models.model_file import write_model
 from scenenet.models.predictions import probabilities
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import TuningSettings
 from scenenet.training.champion import champion
-from scenenet.training.tuning import choose, tune
+from scenenet.training.tuning import choose
 from scenenet.training.tuning_result import Tuning
 
 
@@ -74,23 +73,6 @@ def test_a_cnn_has_no_other_size(crops, pole_finder):
     assert [entry.kernel_size for entry in result.kernel_sizes] == [(5, 5, 5)]
 
 
-def test_tuning_only_uses_validation_crops(chain, pole_finder, tmp_path):
-    model, card = pole_finder
-    write_model(tmp_path / "m.json", model, card.model_copy(update={"tau": None}))
-    result = tune(
-        tmp_path / "m.json", [chain.voxels], chain.split, TuningSettings(),
-        tmp_path / "tuned.json", tmp_path / "tuning.json",
-    )  # fmt: skip
-    assert result.validation.n_samples == 1
-    written = read_json(tmp_path / "tuning.json")
-    assert Tuning.from_json(written) == result and written == result.to_json()
-    (tried,) = written["kernel_sizes"]
-    assert tried == {"kernel_size": written["kernel_size"]} | {
-        name: value for name, value in written["validation"].items() if name != "n_samples"
-    }
-    assert read_model(tmp_path / "tuned.json")[1].tau == result.tau
-
-
 def test_the_champion_is_the_best_on_validation(tmp_path, pole_finder):
     model, card = pole_finder
     models, tunings = [], []
@@ -102,3 +84,19 @@ def test_the_champion_is_the_best_on_validation(tmp_path, pole_finder):
         tunings[-1].write_text(json.dumps(Tuning("m", (9, 9, 9), scores, {}, ()).to_json()))
     assert champion(models, tunings, tmp_path / "champion.json") == models[1]
     assert (tmp_path / "champion.json").read_bytes() == models[1].read_bytes()
+
+
+def test_the_answer_that_users_get_decides_before_the_voxels_at_or_above_tau(tmp_path, pole_finder):
+    model, card = pole_finder
+    models, tunings = [], []
+    for seed, (observer, towers) in enumerate([(0.9, 0.4), (0.5, 0.7), (0.6, 0.7), (0.6, 0.7)]):
+        models.append(tmp_path / f"seed-{seed}.json")
+        write_model(models[-1], model, card.model_copy(update={"provenance": {"seed": seed}}))
+        tunings.append(tmp_path / f"tuning-{seed}.json")
+        of_voxels, whole = (
+            VoxelScores(*[f05] * 5, tau=0.5, n_samples=1) for f05 in (observer, towers)
+        )
+        found = Tuning("m", (9, 9, 9), of_voxels, {}, (), whole)
+        assert Tuning.from_json(found.to_json()) == found
+        tunings[-1].write_text(json.dumps(found.to_json()))
+    assert champion(models, tunings, tmp_path / "champion.json") == models[2]

@@ -5,6 +5,8 @@ rule cross_validation:
     input:
         stores=every("voxels", "store"),
         manifests=every("voxels", "manifest"),
+        crop_stores=every("crops", "store"),
+        crops=every("crops", "manifest"),
     output:
         runs=f"{R}/cross_validation/{{contender}}/runs.csv",
         times=f"{R}/cross_validation/{{contender}}/times.csv",

@@ -85,6 +85,8 @@ rule boosted_trees:
     input:
         stores=every("voxels", "store"),
         manifests=every("voxels", "manifest"),
+        crop_stores=every("crops", "store"),
+        crops=every("crops", "manifest"),
         split=f"{R}/split/split.csv",
     output:
         scores=expand(f"{R}/boosted_trees/seed-{{seed}}.json", seed=VALUES["seed"]),

@@ -49,6 +49,8 @@ for kind, suffix in MODEL_SUFFIXES.items():
             model=f"{R}/train/{{model}}/seed-{{seed}}/model{suffix}",
             stores=every("voxels", "store"),
             manifests=every("voxels", "manifest"),
+            crop_stores=every("crops", "store"),
+            crops=every("crops", "manifest"),
             split=f"{R}/split/split.csv",
         output:
             model=f"{R}/models/{{model}}/seed-{{seed}}{suffix}",
@@ -67,7 +69,9 @@ for kind, suffix in MODEL_SUFFIXES.items():
             mem_mb=3000,
             runtime=60,
         params:
-            job=job("tune", SETTINGS["tuning"]),
+            job=job(
+                "tune", {name: SETTINGS[name] for name in ("tuning", "detection")}
+            ),
         message:
             "Choosing the threshold of {wildcards.model}, seed {wildcards.seed}"
         script:

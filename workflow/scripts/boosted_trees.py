@@ -9,6 +9,7 @@ def boosted_trees(job: _job.Job) -> None:
 
     evaluate_boosted_trees(
         job.input.manifests,
+        job.input.crops,
         job.input.split,
         DetectionSettings(**job.settings),
         job.identity["seeds"],

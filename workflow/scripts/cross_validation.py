@@ -11,6 +11,7 @@ def cross_validation(job: _job.Job) -> None:
     model = job.identity["model"]
     cross_validate(
         job.input.manifests,
+        job.input.crops,
         None if model is None else ModelSettings(**model),
         job.identity["seeds"],
         job.settings["leave_out"],

@@ -11,10 +11,10 @@ def evaluate(job: _job.Job) -> None:
     scores = evaluate(
         job.input.model,
         job.input.manifests,
+        job.input.crops,
         job.input.split,
         DetectionSettings(**job.settings),
         part=job.identity["part"],
-        crop_manifests=job.input.crops,
     )
     write_json(job.output.scores, scores.to_json())
 

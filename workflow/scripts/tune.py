@@ -4,14 +4,17 @@ import _job
 
 
 def tune(job: _job.Job) -> None:
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.evaluation.tune import tune
     from scenenet.models.settings import TuningSettings
-    from scenenet.training.tuning import tune
 
     tune(
         job.input.model,
         job.input.manifests,
+        job.input.crops,
         job.input.split,
-        TuningSettings(**job.settings),
+        TuningSettings(**job.settings["tuning"]),
+        DetectionSettings(**job.settings["detection"]),
         job.output.model,
         job.output.tuning,
     )

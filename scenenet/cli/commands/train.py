@@ -125,6 +125,7 @@ def command(
     from scenenet.core.files import digest
     from scenenet.core.outputs import Output, check_outputs
     from scenenet.core.provenance import package_version
+    from scenenet.detection.settings import DetectionSettings
     from scenenet.models.model_file import is_model_file
 
     if validation is None:
@@ -139,6 +140,7 @@ def command(
         presets.TUNING,
         range(seeds),
         validation,
+        DetectionSettings(),
         {
             "config": digest(settings.model_dump()),
             "version": package_version(),

@@ -15,16 +15,17 @@ import numpy as np
 import pandas as pd
 
 from scenenet.core.progress import track
-from scenenet.dataset.crops import read_crops
+from scenenet.dataset.crops import CropClouds
 from scenenet.dataset.folds import folds
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.answers import Answer, LabelledCrop, at_or_above_tau, with_rules
+from scenenet.evaluation.answers import Answer, at_or_above_tau, with_rules
 from scenenet.experiments.components.settings import ITS_OWN, RULES_ALONE, WITH, WITHOUT
 from scenenet.experiments.components.sources import (
     FIXED,
     Known,
+    LabelledCrop,
     Source,
     from_file,
     trained,
@@ -34,7 +35,6 @@ from scenenet.experiments.components.summary import COUNTED, COUNTS, TOWERS, sco
 from scenenet.experiments.label_noise.settings import LABELS
 from scenenet.experiments.run_tables import write_runs
 from scenenet.metrics.score_columns import TRUTH
-from scenenet.metrics.tower_matching import match_towers
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
 
@@ -77,9 +77,7 @@ class Plan:
             voxel_manifests, crop_manifests: of the stores of voxels, and of the crops they are of.
         """
         data = load(voxel_manifests)
-        clouds = {
-            crop.id: cloud for manifest in crop_manifests for crop, cloud in read_crops(manifest)
-        }
+        clouds = CropClouds(crop_manifests)
 
         def labelled(rows: Sequence[int]) -> list[LabelledCrop]:
             return [
@@ -153,9 +151,12 @@ def _of_source(
     predict, tau = source.predict, source.tau
     answers: dict[str, list[Answer]] = {}
     if source.name != RULES_ALONE:  # without them, every occupied voxel would be tower
-        answers[WITHOUT] = [at_or_above_tau(crop, predict, tau) for crop in part.tested]
+        answers[WITHOUT] = [
+            at_or_above_tau(crop.cloud, crop.sample, predict, tau) for crop in part.tested
+        ]
     answers[WITH] = [
-        with_rules(crop, predict, tau, source.voxel_size, detection) for crop in part.tested
+        with_rules(crop.cloud, crop.sample, predict, tau, source.voxel_size, detection)
+        for crop in part.tested
     ]
     for rules, given in answers.items():
         row = {
@@ -188,16 +189,16 @@ def _scores(crops: Sequence[LabelledCrop], answers: Sequence[Answer]) -> dict[st
         towers = dict.fromkeys(TOWERS, 0)
         known = looked = False
         for crop, answer in zip(crops, answers, strict=True):
-            right = _right(crop, against)
+            right = _right(crop, answer, against)
             if right is None:
                 continue
             known = True
             points, voxels, places = right
-            counts["point"] += Confusion.of(answer.points, points)
-            counts["voxel"] += Confusion.of(answer.voxels, voxels)
-            if answer.towers is not None:
+            counts["point"] += points
+            counts["voxel"] += Confusion.of(answer.among(len(voxels)), voxels)
+            match = answer.match(places)
+            if match is not None:
                 looked = True
-                match = match_towers(answer.towers, places)
                 towers["towers"] += match.n_true
                 towers["towers_found"] += len(match.errors)
                 towers["towers_false"] += match.n_predicted - len(match.errors)
@@ -206,13 +207,14 @@ def _scores(crops: Sequence[LabelledCrop], answers: Sequence[Answer]) -> dict[st
     return row | {"alive": row["point_tp"] > 0}
 
 
-def _right(crop: LabelledCrop, against: str) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """What is tower in a crop: points (N,) and voxels (V,) bool, and the places of the towers;
-    None where it is not known."""
+def _right(
+    crop: LabelledCrop, answer: Answer, against: str
+) -> tuple[Confusion, np.ndarray, np.ndarray] | None:
+    """The counts of the points of an answer, and what is tower in the crop: voxels (V,) bool, and
+    the places of the towers; None where it is not known."""
     if against != TRUTH:
-        _, voxels = crop.sample.spread(np.zeros(len(crop.sample.index), np.float32))
-        return crop.cloud.is_tower, voxels, crop.crop.towers
-    points, true, places = crop.cloud.is_true_tower, crop.sample.truth(), crop.crop.true_towers
+        return answer.points.labels, crop.sample.labels(), crop.crop.towers
+    points, true, places = answer.points.truth, crop.sample.truth(), crop.crop.true_towers
     return None if points is None or true is None or places is None else (points, true, places)
 
 

@@ -11,8 +11,9 @@ import numpy as np
 from scenenet.baselines.published_weights import published_scenenet
 from scenenet.baselines.shape_priors import cut_out, height_above_ground
 from scenenet.convolution.coarsening import block_edge
-from scenenet.dataset.voxels import Measurement, VoxelSample
-from scenenet.evaluation.answers import Answer, LabelledCrop, Predict
+from scenenet.dataset.crops import Crop
+from scenenet.dataset.voxels import Measurement, VoxelSample, median_voxel_size
+from scenenet.evaluation.answers import Answer, Predict
 from scenenet.experiments.components.settings import (
     HIGH,
     HIGH_M,
@@ -29,7 +30,23 @@ from scenenet.models.factory import new_model
 from scenenet.models.model_file import read_model
 from scenenet.models.predictions import probabilities
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
+from scenenet.pointcloud import PointCloud
 from scenenet.training.tuning import tuned_tau
+
+
+@dataclass(frozen=True)
+class LabelledCrop:
+    """A crop as points and as voxels.
+
+    Attributes:
+        crop: its towers.
+        cloud: its points.
+        sample: its voxels, on the grid of the data set.
+    """
+
+    crop: Crop
+    cloud: PointCloud
+    sample: VoxelSample
 
 
 @dataclass(frozen=True)
@@ -69,18 +86,17 @@ class Known:
 
     @property
     def voxel_size(self) -> float:
-        """m, median of the training crops, as in the card of a model."""
-        return float(np.median([sample.grid.voxel_size for sample in self.training]))
+        """m, as in the card of a model."""
+        return median_voxel_size(self.training)
 
 
 def trained(settings: ModelSettings | None, known: Known, seed: int) -> Source:
     """A model that is trained and tuned here; None for the boosted trees."""
     tuned = train_and_tune(settings, known.training, known.validation, seed)
-    size = known.voxel_size
-    if settings is not None:
-        size = new_model(settings, seed).observed_size(size)
     name = BOOSTED_TREES if settings is None else settings.name
-    return Source(name, seed, tuned.predict, tuned.tau, size, tuned.parameters, tuned.seconds)
+    return Source(
+        name, seed, tuned.predict, tuned.tau, tuned.voxel_size, tuned.parameters, tuned.seconds
+    )
 
 
 def from_file(path: str | Path, seed: int) -> Source:
@@ -130,21 +146,25 @@ def _everywhere(sample: VoxelSample) -> tuple[np.ndarray, np.ndarray]:
     return sample.spread(np.ones(len(sample.index), np.float32))
 
 
+def _answer(crop: LabelledCrop, in_tower: np.ndarray, towers: np.ndarray | None = None) -> Answer:
+    return Answer.of_points(crop.cloud, crop.sample.grid, in_tower, towers)
+
+
 def _nothing(crop: LabelledCrop) -> Answer:
-    return Answer.of_points(crop, np.zeros(len(crop.cloud), bool), np.empty((0, 4)))
+    return _answer(crop, np.zeros(len(crop.cloud), bool), np.empty((0, 4)))
 
 
 def _high(crop: LabelledCrop) -> Answer:
-    return Answer.of_points(crop, height_above_ground(crop.cloud.xyz) > HIGH_M)
+    return _answer(crop, height_above_ground(crop.cloud.xyz) > HIGH_M)
 
 
 def _labels(crop: LabelledCrop) -> Answer:
-    return Answer.of_points(crop, crop.cloud.is_tower, crop.crop.towers)
+    return _answer(crop, crop.cloud.is_tower, crop.crop.towers)
 
 
 def _shape_priors(crop: LabelledCrop) -> Answer:
     cut = cut_out(crop.cloud.xyz)
-    return Answer.of_points(crop, cut.points, cut.places)
+    return _answer(crop, cut.points, cut.places)
 
 
 FIXED: Mapping[str, Callable[[LabelledCrop], Answer]] = {

@@ -6,7 +6,7 @@ tau is chosen on the training crops of the fold; nothing is chosen on the crops 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,15 +14,18 @@ from typing import Any
 import pandas as pd
 
 from scenenet.core.progress import track
+from scenenet.dataset.crops import CropClouds
 from scenenet.dataset.folds import folds
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.answers import rules_on
 from scenenet.experiments.cross_validation.summary import COUNTS
 from scenenet.experiments.run_tables import write_runs
 from scenenet.experiments.train_and_tune import train_and_tune
 from scenenet.metrics.score_columns import AT_TAU, SCORES, TRUTH, WHOLE_TOWERS
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
+from scenenet.pointcloud import PointCloud
 
 COLUMNS = (
     "model", "voxels", "seed", "fold", "crops", "training_crops", "alive", "tau",
@@ -33,6 +36,7 @@ COLUMNS = (
 
 def cross_validate(
     voxel_manifests: Sequence[str | Path],
+    crop_manifests: Sequence[str | Path],
     model: ModelSettings | None,
     seeds: Sequence[int],
     leave_out: int,
@@ -48,7 +52,7 @@ def cross_validate(
     models are trained and tau is chosen on labels alone.
 
     Args:
-        voxel_manifests: of the voxel stores.
+        voxel_manifests, crop_manifests: of the stores of voxels, and of the crops they are of.
         model: what to train; None for the boosted trees.
         seeds: of the trainings.
         leave_out, neighbour: as for ``scenenet.dataset.folds.folds``.
@@ -62,19 +66,21 @@ def cross_validate(
     Raises:
         InputError: there are too few crops, or no training crop has a tower.
     """
-    rows = run_folds(load(voxel_manifests), model, seeds, leave_out, neighbour, detection)
+    data, clouds = load(voxel_manifests), CropClouds(crop_manifests)
+    rows = run_folds(data, clouds, model, seeds, leave_out, neighbour, detection)
     return write_runs(rows, COLUMNS, ("model", "seed", "fold"), out, out_times)
 
 
 def run_folds(
     dataset: Dataset,
+    clouds: Mapping[str, PointCloud],
     model: ModelSettings | None,
     seeds: Sequence[int],
     leave_out: int,
     neighbour: float,
     detection: DetectionSettings,
 ) -> list[dict[str, Any]]:
-    """The rows of ``cross_validate``."""
+    """The rows of ``cross_validate``; ``clouds`` has the points of each crop by its id."""
     name = BOOSTED_TREES if model is None else model.name
     parts = folds(dataset.crops, leave_out, neighbour)
     plans = [(seed, number, fold) for seed in seeds for number, fold in enumerate(parts, start=1)]
@@ -83,6 +89,8 @@ def run_folds(
         training = [dataset.samples[i] for i in fold.train]
         left_out = [dataset.samples[i] for i in fold.out]
         tuned = train_and_tune(model, training, [], seed)
+        answer = rules_on(clouds, tuned.predict, tuned.tau, tuned.voxel_size, detection)
+        answers = {sample.id: answer(sample) for sample in left_out}
         shared = {
             "model": name,
             "seed": seed,
@@ -97,7 +105,7 @@ def run_folds(
         true = [one for s in left_out if (one := s.labelled_by_truth()) is not None]
         for voxels, count in (
             (AT_TAU, tuned.score),
-            (WHOLE_TOWERS, partial(tuned.score_towers, detection=detection)),
+            (WHOLE_TOWERS, partial(tuned.score_towers, answers=answers)),
         ):
             counts = count(left_out)
             own = {"voxels": voxels, "alive": counts.tp > 0}

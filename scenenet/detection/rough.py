@@ -1,0 +1,92 @@
+"""Rough towers: candidate axes with height and continuity as the occupied voxels show them.
+
+They say where to look. Points decide (``scenenet.detection.find``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.detection.body import centre_body, measure_body
+from scenenet.detection.candidates import (
+    SAME_M,
+    SURROUNDINGS_M,
+    DetectedVoxels,
+    axes,
+    neighbours_adjacent,
+)
+from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.surroundings import Surroundings
+
+LOOSE = 0.75
+"""Share of the thresholds of height and continuity that a rough tower has to reach."""
+
+
+@dataclass(frozen=True)
+class RoughTower:
+    """What voxels show on an axis.
+
+    Attributes:
+        x, y: m, centre of its body.
+        base: m, elevation of the ground at its foot.
+        height: m, from the base to its top.
+        probability: highest probability of its voxels.
+        voxels: rows of its detected voxels.
+    """
+
+    x: float
+    y: float
+    base: float
+    height: float
+    probability: float
+    voxels: np.ndarray
+
+
+def rough_towers(
+    detected: DetectedVoxels,
+    offset: np.ndarray,
+    surroundings: Surroundings,
+    settings: DetectionSettings,
+) -> list[RoughTower]:
+    """The rough towers at the axes of the detected voxels, relative to ``offset`` (3,) m.
+
+    Axes are half of ``settings.eps`` apart, so a tower may have several.
+    """
+    found: list[RoughTower] = []
+    for axis in neighbours_adjacent(axes(detected, settings, settings.eps / 2)):
+        around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
+        tower = _measure(detected, axis, around, settings)
+        if tower is not None and all(
+            np.hypot(tower.x - other.x, tower.y - other.y) > SAME_M for other in found
+        ):
+            found.append(tower)
+    return found
+
+
+def _measure(
+    detected: DetectedVoxels, axis: np.ndarray, around: np.ndarray, settings: DetectionSettings
+) -> RoughTower | None:
+    """The rough tower on an axis (2,) m, or None if there is none.
+
+    Args:
+        around: (M, 3) m, centres of the occupied voxels within ``SURROUNDINGS_M``.
+    """
+    size, foot_radius = detected.voxel_size, settings.foot_radius
+    min_height, min_upright = LOOSE * settings.min_height, LOOSE * settings.min_upright
+    seen = detected.within(axis, settings.eps / 2)
+    body = measure_body(around, axis, detected.centres[seen, 2], foot_radius, size)
+    if body.height < min_height:
+        return None
+    # The reach of the crossarms follows from the height.
+    crossarm = max(settings.eps / 2, settings.crossarm * body.height)
+    seen = detected.within(axis, crossarm)
+    axis, free = centre_body(around, axis, body, size)
+    if not free:
+        return None
+    body = measure_body(around, axis, detected.centres[seen, 2], foot_radius, size)
+    if body.height < min_height or body.upright < min_upright:
+        return None
+    peak = float(detected.probability[seen].max())
+    return RoughTower(float(axis[0]), float(axis[1]), body.base, body.height, peak, seen)

@@ -1,0 +1,53 @@
+"""Choices on the validation part, and the answer there."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenenet.core.files import read_json
+from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.scoring import evaluate
+from scenenet.evaluation.tune import tune
+from scenenet.models.factory import new_model
+from scenenet.models.model_file import read_model, write_model
+from scenenet.models.settings import MetricSettings, ModelSettings, TuningSettings
+from scenenet.training.tuning_result import Tuning
+
+LONE_POLES = DetectionSettings(min_conductor=0)
+
+
+def tuned(model, card, chain, folder):
+    write_model(folder / "m.json", model, card.model_copy(update={"tau": None}))
+    return tune(
+        folder / "m.json", [chain.voxels], [chain.crops], chain.split, TuningSettings(),
+        LONE_POLES, folder / "tuned.json", folder / "tuning.json",
+    )  # fmt: skip
+
+
+def test_tuning_only_uses_validation_crops(chain, pole_finder, tmp_path):
+    model, card = pole_finder
+    result = tuned(model, card, chain, tmp_path)
+    assert result.validation.n_samples == 1
+    written = read_json(tmp_path / "tuning.json")
+    assert Tuning.from_json(written) == result and written == result.to_json()
+    (tried,) = written["kernel_sizes"]
+    assert tried == {"kernel_size": written["kernel_size"]} | {
+        name: value for name, value in written["validation"].items() if name != "n_samples"
+    }
+    assert read_model(tmp_path / "tuned.json")[1].tau == result.tau
+    assert result.whole_towers is None
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_model_that_gives_whole_towers_is_scored_by_them(whole, chain, pole_finder, tmp_path):
+    _, card = pole_finder
+    settings = ModelSettings(
+        name="m", kind="scenenet", protocol="operational", metric=MetricSettings(whole_towers=whole)
+    )
+    result = tuned(new_model(settings, 0), card, chain, tmp_path)
+    given = evaluate(
+        tmp_path / "tuned.json", [chain.voxels], [chain.crops], chain.split, LONE_POLES,
+        "validation",
+    )  # fmt: skip
+    assert result.whole_towers == (given.voxel if whole else None)
+    assert result.decisive == (given.voxel.f05 or 0.0, given.voxel_observer.f05 or 0.0)

@@ -33,7 +33,8 @@ def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
     """One row per model and seed: test scores, tower scores, tau and epochs."""
     scored = [*SCORES, "average_precision", *(f"tower_{name}" for name in MATCH_SCORES),
               *(f"point_{name}" for name in POINT_SCORES)]  # fmt: skip
-    columns = ["model", "seed", "alive", "tau", "validation_f05", *_against_both(scored), "epochs"]
+    columns = ["model", "seed", "alive", "tau", "validation_f05", "validation_towers_f05",
+               *_against_both(scored), "epochs"]  # fmt: skip
     rows = []
     for result in results.trained:
         both = [(TRUTH, result.evaluation.truth), ("", result.evaluation)]
@@ -43,12 +44,19 @@ def seeds(results: Results, thesis: Thesis | None = None) -> pd.DataFrame:
             "alive": result.alive,
             "tau": result.evaluation.voxel.tau,
             "validation_f05": None if result.validation is None else result.validation.f05,
+            "validation_towers_f05": _of_towers(result),
             "epochs": result.epochs,
         }
         for against, scores in both:
             row |= {f"{against}{name}": value for name, value in _of_seed(scores).items()}
         rows.append(row)
     return pd.DataFrame(rows, columns=columns)
+
+
+def _of_towers(result: SeedResult) -> float | None:
+    """F0.5 of whole towers on the validation crops; None for a model that gives voxels."""
+    tuning = result.tuning
+    return None if tuning is None or tuning.whole_towers is None else tuning.whole_towers.f05
 
 
 def _of_seed(scores: Scores | None) -> dict[str, float | None]:
@@ -68,8 +76,8 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
     """Table 5.3: voxel scores on the test crops, with those of the thesis and a trivial baseline.
 
     Column ``counted`` names the trainings of a row: ``all seeds``, ``live seeds`` (only if some
-    models are dead), or the seed that is best on validation, which classifies surveys. The thesis
-    reports live models only (5.2.6). The boosted trees (``scenenet.baselines.boosted_trees``) are
+    models are dead), the seed that is best on validation, which classifies surveys, or the one
+    that is worst on the test crops. The thesis reports live models only (5.2.6). The boosted trees (``scenenet.baselines.boosted_trees``) are
     trained, tuned and scored on the same crops. Column ``voxels`` says which voxels count as
     detected: ``AT_TAU`` or ``WHOLE_TOWERS`` (docs/method/detection.md).
     """
@@ -189,6 +197,9 @@ def _counted(
         yield "live seeds", live
     if champion is not None:
         yield f"seed {champion.seed}, best on validation", [champion]
+    if len(trained) > 1:
+        worst = min(trained, key=lambda result: result.evaluation.leading.voxel.decisive)
+        yield f"seed {worst.seed}, worst on test", [worst]
 
 
 def _mean_and_std(

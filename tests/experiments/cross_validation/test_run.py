@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from scenenet.dataset.crops import CropSettings, Truth, crop_of, cut_crops
+from scenenet.dataset.crops import CropClouds, CropSettings, Truth, crop_of, cut_crops
 from scenenet.dataset.folds import folds
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.voxel_cache import build, load
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
+from scenenet.evaluation.answers import rules_on
 from scenenet.experiments.cross_validation.run import (
     COLUMNS,
     cross_validate,
@@ -43,10 +44,18 @@ def manifest(tmp_path_factory):
     return folder / "voxels.json"
 
 
+def rows_of(manifest, dataset, model, leave_out):
+    """The rows of one seed."""
+    clouds = CropClouds([manifest.with_name("crops.json")])
+    return run_folds(dataset, clouds, model, (0,), leave_out, 0.0, DETECTION)
+
+
 def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     thesis = models[1]
     files = tmp_path / "runs.csv", tmp_path / "times.csv"
-    both = cross_validate([manifest], thesis, (0, 1), 2, 0.0, DETECTION, *files)
+    both = cross_validate(
+        [manifest], [manifest.with_name("crops.json")], thesis, (0, 1), 2, 0.0, DETECTION, *files
+    )
     assert tuple(pd.read_csv(files[0]).columns) == COLUMNS == tuple(both.columns)
     times = pd.read_csv(files[1])
     assert list(times.columns) == ["model", "seed", "fold", "training_seconds"]
@@ -68,10 +77,13 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     assert (row["tau"], row["f05"], row["tp"]) == (tuned.tau, counts.f05, counts.tp)
     assert row["tp"] + row["fn"] == sum(int(sample.tower.sum()) for sample in out)
     row = whole[(whole["seed"] == 1) & (whole["fold"] == 2)].iloc[0]
-    counts = tuned.score_towers(out, DETECTION)
+    clouds = CropClouds([manifest.with_name("crops.json")])
+    rules = rules_on(clouds, tuned.predict, tuned.tau, tuned.voxel_size, DETECTION)
+    answers = {sample.id: rules(sample) for sample in out}
+    counts = tuned.score_towers(out, answers)
     assert (row["tau"], row["f05"], row["tp"]) == (tuned.tau, counts.f05, counts.tp)
     against_truth = [replace(sample, tower=sample.true) for sample in out]
-    counts = tuned.score_towers(against_truth, DETECTION)
+    counts = tuned.score_towers(against_truth, answers)
     assert (row["truth_f05"], row["truth_tp"]) == (counts.f05, counts.tp)
     row = table[(table["seed"] == 1) & (table["fold"] == 2)].iloc[0]
     counts = tuned.score(against_truth)
@@ -83,17 +95,17 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
 def test_only_crops_with_a_known_truth_are_scored_against_it(manifest, models):
     dataset = load([manifest])
     some = [replace(s, true=s.true if n else None) for n, s in enumerate(dataset.samples)]
-    rows = run_folds(replace(dataset, samples=some), models[1], (0,), 2, 0.0, DETECTION)
+    rows = rows_of(manifest, replace(dataset, samples=some), models[1], 2)
     first = next(row for row in rows if row["voxels"] == AT_TAU and row["fold"] == 1)
     assert first["truth_tp"] + first["truth_fn"] == some[1].true.sum()
     none = [replace(sample, true=None) for sample in some]
-    for row in run_folds(replace(dataset, samples=none), models[1], (0,), 2, 0.0, DETECTION):
+    for row in rows_of(manifest, replace(dataset, samples=none), models[1], 2):
         assert row["truth_f05"] is None and row["truth_tp"] is None
         assert row["f05"] is not None
 
 
 def test_the_boosted_trees_take_part(manifest):
-    (row, *_) = run_folds(load([manifest]), None, (0,), 3, 0.0, DETECTION)
+    (row, *_) = rows_of(manifest, load([manifest]), None, 3)
     assert row["model"] == "boosted trees"
     assert row["training_crops"] == 3
     assert 0 < row["tau"] < 1

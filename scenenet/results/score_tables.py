@@ -76,10 +76,11 @@ def models(results: Results, thesis: Thesis) -> pd.DataFrame:
     """Table 5.3: voxel scores on the test crops, with those of the thesis and a trivial baseline.
 
     Column ``counted`` names the trainings of a row: ``all seeds``, ``live seeds`` (only if some
-    models are dead), the seed that is best on validation, which classifies surveys, or the one
-    that is worst on the test crops. The thesis reports live models only (5.2.6). The boosted trees (``scenenet.baselines.boosted_trees``) are
-    trained, tuned and scored on the same crops. Column ``voxels`` says which voxels count as
-    detected: ``AT_TAU`` or ``WHOLE_TOWERS`` (docs/method/detection.md).
+    models are dead), the seed that is best on validation, which classifies surveys, or the one that
+    is worst on the test crops. The thesis reports live models only (5.2.6). The boosted trees
+    (``scenenet.baselines.boosted_trees``) are trained, tuned and scored on the same crops. Column
+    ``voxels`` says which voxels count as detected: ``AT_TAU`` or ``WHOLE_TOWERS``
+    (docs/method/detection.md).
     """
     columns = ["model", "counted", "voxels", "n_seeds", "live_share", "parameters"]
     columns += _against_both(f"{name}{part}" for name in SCORES for part in ("", "_std"))

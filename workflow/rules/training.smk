@@ -69,9 +69,7 @@ for kind, suffix in MODEL_SUFFIXES.items():
             mem_mb=3000,
             runtime=60,
         params:
-            job=job(
-                "tune", {name: SETTINGS[name] for name in ("tuning", "detection")}
-            ),
+            job=job("tune", {name: SETTINGS[name] for name in ("tuning", "detection")}),
         message:
             "Choosing the threshold of {wildcards.model}, seed {wildcards.seed}"
         script:

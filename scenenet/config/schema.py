@@ -119,6 +119,16 @@ class Config(Settings):
         min_length=1, description="every model is trained once from each seed"
     )
     tuning: TuningSettings = TuningSettings()
+    score_points: bool = Field(
+        True,
+        description="whether the points of the test crops are scored too, as predict answers them; "
+        "it takes far longer than the scores of voxels",
+    )
+    study_values: Mapping[str, Any] = Field(
+        {},
+        description="values, by dotted name, for settings that studies change in `common` or in "
+        "`changes`; they replace those values in every study",
+    )
     studies: tuple[StudySettings, ...] = Field(
         (),
         description="series of short trainings that differ in one setting; see config/studies.yaml",
@@ -154,6 +164,17 @@ class Config(Settings):
             for model in models
         ]
         return {**raw, "models": filled}
+
+    @model_validator(mode="before")
+    @classmethod
+    def _replaced_in_studies(cls, raw: Any) -> Any:
+        """Put ``study_values`` into the studies that change these settings."""
+        if not isinstance(raw, Mapping) or not isinstance(raw.get("study_values"), Mapping):
+            return raw
+        values, studies = raw["study_values"], raw.get("studies")
+        if not isinstance(studies, list | tuple):
+            return raw
+        return {**raw, "studies": [_with_values(study, values) for study in studies]}
 
     @model_validator(mode="after")
     def _names_fit(self) -> Self:
@@ -218,6 +239,19 @@ class Config(Settings):
     def plain(self) -> dict[str, Any]:
         """All settings with defaults, as dicts, lists, strings and numbers."""
         return self.model_dump(mode="json")
+
+
+def _with_values(study: Any, values: Mapping[str, Any]) -> Any:
+    """A study, or a variant of one, as it was written, with other values for what it changes."""
+    if not isinstance(study, Mapping):
+        return study
+    replaced = dict(study)
+    for part in ("common", "changes"):
+        if isinstance(changes := study.get(part), Mapping):
+            replaced[part] = {name: values.get(name, value) for name, value in changes.items()}
+    if isinstance(variants := study.get("variants"), list | tuple):
+        replaced["variants"] = [_with_values(variant, values) for variant in variants]
+    return replaced
 
 
 def load(raw: Mapping[str, Any], file: str | None = None) -> Config:

@@ -32,16 +32,17 @@ def shipped(root, name):
     return merged(*read)
 
 
-@pytest.mark.parametrize("name", ["config.yaml", "test.yaml", "ts40k.yaml"])
+@pytest.mark.parametrize("name", ["config.yaml", "full.yaml", "test.yaml", "ts40k.yaml"])
 def test_the_shipped_configurations_are_valid(project_root, name):
     config = load(shipped(project_root, name))
     assert {model.kind for model in config.models} == {"scenenet", "cnn"}
 
 
 def test_the_shipped_configurations_write_to_different_folders_and_names(project_root):
-    configs = [load(shipped(project_root, n)) for n in ("config.yaml", "test.yaml", "ts40k.yaml")]
-    assert len({config.results_dir for config in configs}) == 3
-    assert len({config.dataset for config in configs}) == 3
+    names = ("config.yaml", "full.yaml", "test.yaml", "ts40k.yaml")
+    configs = [load(shipped(project_root, name)) for name in names]
+    assert len({config.results_dir for config in configs}) == 4
+    assert len({config.dataset for config in configs}) == 4
     # All share one store; with different settings each would create it again.
     assert len({config.tracking for config in configs}) == 1
 
@@ -57,6 +58,44 @@ def test_the_default_protocol_is_that_of_the_thesis(project_root):
         assert (loss.alpha, loss.epsilon, loss.rho_shape, loss.rho_mixing) == (5, 0.1, 5, 5)
         assert model.kernel_size == (9, 9, 9)
     assert len(config.seeds) >= 5
+
+
+def test_the_full_configuration_is_chapter_5_at_its_own_scale(project_root):
+    config = load(merged(shipped(project_root, "studies.yaml"), shipped(project_root, "full.yaml")))
+    lines = config.synthetic.surveys
+    assert sum(line.towers for line in lines) == 2823
+    sheet = (project_root / "config" / "full.tsv").read_text().splitlines()[1:]
+    assert [row.split("\t")[0] for row in sheet] == [line.name for line in lines]
+    assert len({line.seed for line in lines}) == len(lines)
+    assert (config.split.train, config.split.validation, config.split.test) == (0.2, 0.1, 0.7)
+    assert len(config.seeds) == 5
+    for model in config.models:
+        assert model.protocol == "thesis"
+        assert (model.training.epochs, model.training.learning_rate) == (50, 0.001)
+        assert model.training.batch_size == 8
+    assert len(config.studies) == 16
+    written = [config.study_named(name) for name in ("ablations", "starts", "epochs")]
+    for study in written:
+        for changes in (study.common, *(variant.changes for variant in study.variants)):
+            assert changes.get("training.learning_rate", 0.001) == 0.001
+    # What a study varies stays.
+    assert config.study_named("learning-rate").vary["training.learning_rate"][0] == 0.1
+
+
+def test_values_for_studies_replace_only_what_a_study_sets():
+    study = {
+        "name": "s", "title": "t", "place": "p", "asks": "a",
+        "common": {"training.learning_rate": 0.01},
+        "variants": [
+            {"name": "a"},
+            {"name": "b", "changes": {"training.learning_rate": 0.1, "training.epochs": 3}},
+        ],
+    }  # fmt: skip
+    values = {"training.learning_rate": 0.001, "training.decay": 0.5}
+    (found,) = load(raw(studies=[study], study_values=values)).studies
+    assert found.common == {"training.learning_rate": 0.001}
+    assert found.variants[0].changes == {}
+    assert found.variants[1].changes == {"training.learning_rate": 0.001, "training.epochs": 3}
 
 
 def test_a_configuration_with_all_defaults_written_out_is_the_same(project_root):

@@ -61,6 +61,7 @@ rule survey_map:
     resources:
         mem_mb=3000,
         runtime=30,
+    priority: 1
     params:
         job=lambda w: job(
             "figures",
@@ -101,6 +102,7 @@ rule tower_map:
     resources:
         mem_mb=3000,
         runtime=30,
+    priority: 1
     params:
         job=lambda w: job(
             "figures",

@@ -55,13 +55,13 @@ rule survey_map:
         f"{R}/benchmarks/survey_map/{{survey}}.tsv"
     wildcard_constraints:
         survey=any_of(filter(has_map, TRAIN)),
+    priority: 1
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
         runtime=30,
-    priority: 1
     params:
         job=lambda w: job(
             "figures",
@@ -96,13 +96,13 @@ rule tower_map:
         f"{R}/benchmarks/tower_map/{{survey}}.tsv"
     wildcard_constraints:
         survey=any_of(filter(has_map, TRAIN)),
+    priority: 1
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=3000,
         runtime=30,
-    priority: 1
     params:
         job=lambda w: job(
             "figures",

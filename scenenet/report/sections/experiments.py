@@ -41,8 +41,8 @@ def cross_validation(context: ReportContext) -> Section | None:
         "tau is chosen on the labels of the others. Mean over the folds ± its standard deviation "
         f"over {seeds} seeds. Pooled: from the counts of all folds together. “At or above tau”: "
         "every voxel whose probability reaches the threshold counts as detected. “Whole towers”: "
-        "every voxel of a tower that was found counts as detected, its body included, by the same "
-        "rules for every model (docs/method/detection.md)."
+        "every voxel with a point of a tower that was found counts as detected, by the same rules "
+        "for every model (docs/method/detection.md)."
     )
     text = (
         f"Main result: with only {crops} crops, each of them is a test crop once, so that no score "

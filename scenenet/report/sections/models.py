@@ -121,8 +121,9 @@ def _both_ways(frame: pd.DataFrame, scores: Sequence[Column], measured: Against)
         f"Against the {measured.name}: "
         "the same predictions on the same test crops, counted in two ways: the voxels at or above "
         "tau, as in the thesis, and the voxels of whole towers. A whole tower is accepted by its "
-        "height, its body and its conductors, and all of its body counts. The rules are the same "
-        "for every model, and nothing in them is trained (docs/method/detection.md). Mean ± "
+        "height, its body and its conductors, and every voxel with one of its points counts. The "
+        "rules are the same for every model, and nothing in them is trained "
+        "(docs/method/detection.md). Mean ± "
         "standard deviation over seeds."
     )
     return table(frame, columns, caption, "tables/whole_towers.csv")

@@ -15,11 +15,12 @@ class DetectionSettings(Settings):
     """How towers are found in the probabilities of voxels (docs/method/detection.md)."""
 
     look: float = Field(
-        0.5,
+        0.4,
         gt=0,
         le=1,
-        description="share of the observer's value at tau from which voxels are detected. A tower "
-        "whose voxels all stay below tau needs twice `min_conductor`",
+        description="share of the observer's value at tau from which voxels are detected: tau "
+        "differs between seeds by a third, and the rules decide what is a tower. A tower whose "
+        "voxels all stay below tau needs twice `min_conductor`",
     )
     eps: float = Field(
         6.0,

@@ -176,9 +176,9 @@ def test_a_tree_under_a_line_is_not_a_tower(points, lattice):
         assert detect(upper(lattice.column(0, 0, 0, 17)), around, probability=probability) == []
 
 
-def test_voxels_from_half_the_response_at_tau_are_candidates():
+def test_voxels_from_two_fifths_of_the_response_at_tau_are_candidates():
     settings = DetectionSettings()
-    assert np.arctanh(settings.threshold(0.99)) == pytest.approx(np.arctanh(0.99) / 2)
+    assert np.arctanh(settings.threshold(0.99)) == pytest.approx(np.arctanh(0.99) * 0.4)
     assert settings.threshold(0.0) == 0.0
     assert settings.threshold(1.0) == 1.0
     assert DetectionSettings(look=1.0).threshold(0.7) == pytest.approx(0.7)

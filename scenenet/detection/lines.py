@@ -59,6 +59,23 @@ PARALLEL = 10.0
 """degrees, largest difference between the directions that a line has at its points."""
 
 
+class Grid(NamedTuple):
+    """Points in cells of ``CELL_M``, those of a cell one after another.
+
+    Attributes:
+        x, y, z: (N,) m.
+        shape: (3,) number of cells.
+        starts: (C + 1,) where the points of each cell start, with the cells of a column one after
+            another.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    shape: np.ndarray
+    starts: np.ndarray
+
+
 def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The tested points that lie on a thin, nearly level line.
 
@@ -74,18 +91,26 @@ def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray,
     if len(tested) == 0:
         return np.empty(0, np.int64), np.empty((0, 3))
     cells = np.floor((points - points.min(axis=0)) / CELL_M).astype(np.int64)
-    shape = cells.max(axis=0) + 1
-    number = np.ravel_multi_index(tuple(cells.T), tuple(shape))
-    order = np.argsort(number, kind="stable")
-    starts = np.searchsorted(number[order], np.arange(int(shape.prod()) + 1))
-    grid = cells, shape, order, starts, LINE
+    grid = _grid(points, cells)
     step = len(tested) // SAMPLE
-    if step > 1 and not _on_lines(points, tested[::step], *grid)[0].any():
-        return np.empty(0, np.int64), np.empty((0, 3))
-    on_line, direction = _on_lines(points, tested, *grid)
+    if step > 1:
+        few = tested[::step]
+        if not _on_lines(grid, points[few], cells[few], LINE)[0].any():
+            return np.empty(0, np.int64), np.empty((0, 3))
+    on_line, direction = _on_lines(grid, points[tested], cells[tested], LINE)
     rows, direction = tested[on_line], direction[on_line]
     same = _continued(points[rows], direction)
     return rows[same], direction[same]
+
+
+def _grid(points: np.ndarray, cells: np.ndarray) -> Grid:
+    """The points (N, 3) m by their cells (N, 3)."""
+    shape = cells.max(axis=0) + 1
+    number = np.ravel_multi_index(tuple(cells.T), tuple(shape))
+    x, y, z = np.ascontiguousarray(points[np.argsort(number, kind="stable")].T)
+    starts = np.zeros(int(shape.prod()) + 1, np.int64)
+    np.cumsum(np.bincount(number, minlength=len(starts) - 1), out=starts[1:])
+    return Grid(x, y, z, shape, starts)
 
 
 def _continued(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -108,30 +133,33 @@ def _continued(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
 
 
 @numba.njit(**COMPILED)
-def _on_lines(points, tested, cells, shape, order, starts, line):  # pragma: no cover - compiled
-    """Whether each of the rows ``tested`` (M,) is on a line, (M,) bool, and unit vectors (M, 3)
-    along the best lines tried. ``cells`` (N, 3) is the cell of each point in a grid of ``shape``;
-    ``order`` has the rows of each cell one after another, from ``starts`` on."""
-    found = np.zeros(len(tested), np.bool_)
-    direction = np.zeros((len(tested), 3))
-    near = np.empty((len(points), 4))
-    votes = np.empty(AZIMUTHS * SLOPES, np.int64)
-    towards = np.empty((AZIMUTHS * SLOPES, 3))
+def _on_lines(grid, places, cells, line):  # pragma: no cover - compiled
+    """Whether each place (M, 3) m, a point in the cell (M, 3) of ``grid``, is on a line, (M,) bool,
+    and unit vectors (M, 3) along the best lines tried."""
+    found = np.zeros(len(places), np.bool_)
+    direction = np.zeros((len(places), 3))
+    near = np.empty((4, len(grid.x)))
+    inside = np.empty(len(grid.x), np.bool_)
+    way = np.empty(len(grid.x), np.int32)
+    votes = np.empty(AZIMUTHS * SLOPES + 1, np.int32)
+    towards = np.empty((AZIMUTHS * SLOPES + 1, 3))
     u, middle = np.empty(3), np.empty(3)
-    for row in range(len(tested)):
-        if _in_crown(points, tested[row], cells, shape, order, starts, line):
+    high = _levels_around(line)
+    for row in range(len(places)):
+        if _in_crown(grid, places[row], cells[row], line):
             continue
-        n = _neighbours(points, tested[row], cells, shape, order, starts, line, near)
-        _vote(near[:n], line, votes, towards)
+        n = _neighbours(grid, places[row], cells[row], line, high, near)
+        x, y, z, square = near[0, :n], near[1, :n], near[2, :n], near[3, :n]
+        _vote(x, y, z, line, way[:n], votes, towards)
         best = 0
         for _ in range(TRIED):
-            most = np.argmax(votes)
+            most = np.argmax(votes[:-1])
             if votes[most] == 0:
                 break
             votes[most] = 0
             u[:] = towards[most]
-            _fit(near[:n], line, u, middle)
-            on = _pieces_on_line(near[:n], line, u, middle)
+            _fit(x, y, z, square, line, u, middle, inside[:n])
+            on = _pieces_on_line(x, y, z, line, u, middle)
             if on > best:
                 best = on
                 direction[row] = u
@@ -140,136 +168,153 @@ def _on_lines(points, tested, cells, shape, order, starts, line):  # pragma: no 
 
 
 @numba.njit(**COMPILED)
-def _neighbours(points, i, cells, shape, order, starts, line, near):  # pragma: no cover - compiled
-    """Write the offsets of the neighbours of point ``i`` that may lie on a line through it, or
-    beside one, and their squared lengths, into ``near`` (N, 4); returns their number."""
+def _levels_around(line):  # pragma: no cover - compiled
+    """(S, S) cells above and below a cell that may have points of a line through it, for columns
+    0 to S - 1 cells away along each axis."""
+    steps = int(np.ceil(line.reach / CELL_M)) + 1
+    high = np.empty((steps, steps), np.int64)
+    for a in range(steps):
+        for b in range(steps):
+            far = (np.hypot(a, b) + 1.5) * CELL_M
+            high[a, b] = int((line.rise * far + line.outer) / CELL_M) + 1
+    return high
+
+
+@numba.njit(**COMPILED)
+def _neighbours(grid, place, cell, line, high, near):  # pragma: no cover - compiled
+    """Write the offsets of the neighbours of a place that may lie on a line through it, or beside
+    one, and their squared lengths, into ``near`` (4, N); returns their number."""
     n = 0
-    x, y, z = points[i]
-    steps = int(np.ceil(line.reach / CELL_M))
-    for a in range(max(cells[i, 0] - steps, 0), min(cells[i, 0] + steps + 1, shape[0])):
-        for b in range(max(cells[i, 1] - steps, 0), min(cells[i, 1] + steps + 1, shape[1])):
-            column = (a * shape[1] + b) * shape[2]
-            far = (np.hypot(a - cells[i, 0], b - cells[i, 1]) + 1.5) * CELL_M
-            high = int((line.rise * far + line.outer) / CELL_M) + 1
-            first = column + max(cells[i, 2] - high, 0)
-            last = column + min(cells[i, 2] + high + 1, shape[2])
-            for k in range(starts[first], starts[last]):
-                j = order[k]
-                dx, dy, dz = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
+    px, py, pz = place
+    x, y, z, square = near[0], near[1], near[2], near[3]
+    steps = len(high) - 1
+    for a in range(max(cell[0] - steps, 0), min(cell[0] + steps + 1, grid.shape[0])):
+        for b in range(max(cell[1] - steps, 0), min(cell[1] + steps + 1, grid.shape[1])):
+            column = (a * grid.shape[1] + b) * grid.shape[2]
+            levels = high[abs(a - cell[0]), abs(b - cell[1])]
+            first = column + max(cell[2] - levels, 0)
+            last = column + min(cell[2] + levels + 1, grid.shape[2])
+            for k in range(grid.starts[first], grid.starts[last]):
+                dx, dy, dz = grid.x[k] - px, grid.y[k] - py, grid.z[k] - pz
                 planar = dx * dx + dy * dy
-                if (
-                    planar > line.reach * line.reach
-                    or abs(dz) > line.rise * np.sqrt(planar) + line.outer
-                ):
-                    continue
-                near[n, 0], near[n, 1], near[n, 2], near[n, 3] = dx, dy, dz, planar + dz * dz
-                n += 1
+                x[n], y[n], z[n], square[n] = dx, dy, dz, planar + dz * dz
+                # Without a branch: the processor could not foresee it.
+                n += (planar <= line.reach * line.reach) & (
+                    abs(dz) <= line.rise * np.sqrt(planar) + line.outer
+                )
     return n
 
 
 @numba.njit(**COMPILED)
-def _in_crown(points, i, cells, shape, order, starts, line):  # pragma: no cover - compiled
-    """Whether the nearest neighbours of point ``i`` are not on one line. Most points of a crown are
+def _in_crown(grid, place, cell, line):  # pragma: no cover - compiled
+    """Whether the nearest neighbours of a place are not on one line. Most points of a crown are
     excluded by it, at a small cost."""
     n = 0
-    total, product = np.zeros(3), np.zeros((3, 3))
-    offset = np.empty(3)
-    for a in range(max(cells[i, 0] - 1, 0), min(cells[i, 0] + 2, shape[0])):
-        for b in range(max(cells[i, 1] - 1, 0), min(cells[i, 1] + 2, shape[1])):
-            column = (a * shape[1] + b) * shape[2]
-            first = column + max(cells[i, 2] - 1, 0)
-            last = column + min(cells[i, 2] + 2, shape[2])
-            for k in range(starts[first], starts[last]):
-                square = 0.0
-                for axis in range(3):
-                    offset[axis] = points[order[k], axis] - points[i, axis]
-                    square += offset[axis] * offset[axis]
-                if square <= line.outer**2:
+    px, py, pz = place
+    sx = sy = sz = xx = xy = xz = yy = yz = zz = 0.0
+    for a in range(max(cell[0] - 1, 0), min(cell[0] + 2, grid.shape[0])):
+        for b in range(max(cell[1] - 1, 0), min(cell[1] + 2, grid.shape[1])):
+            column = (a * grid.shape[1] + b) * grid.shape[2]
+            first = column + max(cell[2] - 1, 0)
+            last = column + min(cell[2] + 2, grid.shape[2])
+            for k in range(grid.starts[first], grid.starts[last]):
+                x, y, z = grid.x[k] - px, grid.y[k] - py, grid.z[k] - pz
+                if x * x + y * y + z * z <= line.outer**2:
                     n += 1
-                    for axis in range(3):
-                        total[axis] += offset[axis]
-                        for other in range(3):
-                            product[axis, other] += offset[axis] * offset[other]
+                    sx, sy, sz = sx + x, sy + y, sz + z
+                    xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
+                    yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
     if n < line.pieces:
         return False
-    trace = 0.0
-    for axis in range(3):
-        for other in range(3):
-            product[axis, other] = (product[axis, other] - total[axis] * total[other] / n) / n
-        trace += product[axis, axis]
+    xx, xy, xz = (xx - sx * sx / n) / n, (xy - sx * sy / n) / n, (xz - sx * sz / n) / n
+    yy, yz, zz = (yy - sy * sy / n) / n, (yz - sy * sz / n) / n, (zz - sz * sz / n) / n
+    trace = xx + yy + zz
     # The largest eigenvalue, by squaring: the variance along the line.
-    power = product / max(trace, 1e-12)
+    scale = max(trace, 1e-12)
+    a, b, c, d, e, f = xx / scale, xy / scale, xz / scale, yy / scale, yz / scale, zz / scale
     for _ in range(4):
-        power = power @ power
-        power /= max(power[0, 0] + power[1, 1] + power[2, 2], 1e-300)
-    along = (power * product).sum()
+        a, b, c, d, e, f = (
+            a * a + b * b + c * c,
+            a * b + b * d + c * e,
+            a * c + b * e + c * f,
+            b * b + d * d + e * e,
+            b * c + d * e + e * f,
+            c * c + e * e + f * f,
+        )
+        scale = max(a + d + f, 1e-300)
+        a, b, c, d, e, f = a / scale, b / scale, c / scale, d / scale, e / scale, f / scale
+    along = a * xx + d * yy + f * zz + 2 * (b * xy + c * xz + e * yz)
     return trace - along > line.thick**2
 
 
 @numba.njit(**COMPILED)
-def _vote(near, line, votes, towards):  # pragma: no cover - compiled
-    """Count the neighbours in each direction into ``votes`` (D,), and sum their offsets into
-    ``towards`` (D, 3)."""
+def _vote(x, y, z, line, way, votes, towards):  # pragma: no cover - compiled
+    """Count the neighbours in each direction into ``votes`` (D + 1,), and sum their offsets into
+    ``towards`` (D + 1, 3); the last are of those that do not count. ``way`` (N,) is overwritten."""
     votes[:] = 0
     towards[:] = 0
-    for k in range(len(near)):
-        x, y, z = near[k, 0], near[k, 1], near[k, 2]
-        planar = np.sqrt(x * x + y * y)
-        if planar <= line.reach / 4 or abs(z) >= line.rise * planar:
-            continue
-        if y < 0:
-            x, y, z = -x, -y, -z
+    for k in range(len(x)):
+        side = -1.0 if y[k] < 0 else 1.0
+        planar = np.sqrt(x[k] * x[k] + y[k] * y[k])
         # On a square instead of a circle: an arc tangent would take most of the time.
-        azimuth = min(int((1 - x / (abs(x) + y)) / 2 * AZIMUTHS), AZIMUTHS - 1)
-        slope = int((z / (line.rise * planar) + 1) / 2 * SLOPES)
-        way = azimuth * SLOPES + slope
-        votes[way] += 1
-        towards[way, 0] += x
-        towards[way, 1] += y
-        towards[way, 2] += z
+        around = side * x[k] / (abs(x[k]) + abs(y[k]))
+        azimuth = min(np.int32((1 - around) / 2 * AZIMUTHS), np.int32(AZIMUTHS - 1))
+        slope = np.int32((side * z[k] / (line.rise * planar) + 1) / 2 * SLOPES)
+        counts = (planar > line.reach / 4) & (abs(z[k]) < line.rise * planar)
+        way[k] = azimuth * np.int32(SLOPES) + slope if counts else np.int32(AZIMUTHS * SLOPES)
+    for k in range(len(x)):
+        side = -1.0 if y[k] < 0 else 1.0
+        votes[way[k]] += 1
+        towards[way[k], 0] += side * x[k]
+        towards[way[k], 1] += side * y[k]
+        towards[way[k], 2] += side * z[k]
 
 
 @numba.njit(**COMPILED)
-def _fit(near, line, u, middle):  # pragma: no cover - compiled
+def _fit(x, y, z, square, line, u, middle, inside):  # pragma: no cover - compiled
     """Turn ``u`` (3,) into the direction of the points around its line, and write their middle,
     relative to the point at the origin, into ``middle`` (3,): the point may be on one conductor of
-    a bundle. ``u`` becomes a unit vector."""
-    middle[:] = 0
+    a bundle. ``u`` becomes a unit vector. ``inside`` (N,) is overwritten."""
     for _ in range(2):
         length = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
         a, b, c = u[0] / length, u[1] / length, u[2] / length
-        u[:] = 0
-        x = y = z = 0.0
+        for k in range(len(x)):
+            along = x[k] * a + y[k] * b + z[k] * c
+            inside[k] = square[k] - along * along <= line.inner**2
+        ux = uy = uz = mx = my = mz = 0.0
         n = 0
-        for k in range(len(near)):
-            along = near[k, 0] * a + near[k, 1] * b + near[k, 2] * c
-            if near[k, 3] - along * along <= line.inner**2:
+        for k in range(len(x)):
+            if inside[k]:
+                along = x[k] * a + y[k] * b + z[k] * c
                 n += 1
-                x += near[k, 0] - along * a
-                y += near[k, 1] - along * b
-                z += near[k, 2] - along * c
-                u[0] += near[k, 0] * along
-                u[1] += near[k, 1] * along
-                u[2] += near[k, 2] * along
-        middle[0], middle[1], middle[2] = x / n, y / n, z / n
+                mx, my, mz = mx + x[k] - along * a, my + y[k] - along * b, mz + z[k] - along * c
+                ux, uy, uz = ux + x[k] * along, uy + y[k] * along, uz + z[k] * along
+        u[0], u[1], u[2] = ux, uy, uz
+        middle[0], middle[1], middle[2] = mx / n, my / n, mz / n
     u /= np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
 
 
 @numba.njit(**COMPILED)
-def _pieces_on_line(near, line, u, middle):  # pragma: no cover - compiled
+def _pieces_on_line(x, y, z, line, u, middle):  # pragma: no cover - compiled
     """Number of pieces of 1 m along ``u`` (3,) that have a point; 0 with points beside the line."""
     if (middle * middle).sum() > line.thick**2:
         return 0
+    ux, uy, uz = u
+    mx, my, mz = middle
+    on = beside = 0
+    for k in range(len(x)):
+        dx, dy, dz = x[k] - mx, y[k] - my, z[k] - mz
+        along = dx * ux + dy * uy + dz * uz
+        square = dx * dx + dy * dy + dz * dz - along * along
+        on += square <= line.thick**2
+        beside += (square > line.inner**2) & (square <= line.outer**2)
+    if beside > line.beside * on:
+        return 0
     longest = np.ceil(np.sqrt(1 + line.rise * line.rise) * line.reach) + 2
     pieces = np.zeros(2 * int(longest) + 1, np.bool_)
-    on = beside = 0
-    for k in range(len(near)):
-        x, y, z = near[k, 0] - middle[0], near[k, 1] - middle[1], near[k, 2] - middle[2]
-        along = x * u[0] + y * u[1] + z * u[2]
-        square = x * x + y * y + z * z - along * along
-        if square <= line.thick**2:
-            on += 1
+    for k in range(len(x)):
+        dx, dy, dz = x[k] - mx, y[k] - my, z[k] - mz
+        along = dx * ux + dy * uy + dz * uz
+        if dx * dx + dy * dy + dz * dz - along * along <= line.thick**2:
             pieces[int(np.floor(along + longest + 0.5))] = True
-        elif line.inner**2 < square <= line.outer**2:
-            beside += 1
-    return pieces.sum() if beside <= line.beside * on else 0
+    return pieces.sum()

@@ -11,6 +11,7 @@ approximate axis, and h in m above the ground.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -134,16 +135,16 @@ def _search(
     n_levels = max(1, int(np.ceil(height / level)))
     best: tuple[float, float, np.ndarray, float] | None = None
     merit = 0.0
-    for width in WIDTHS_M:
-        if width > slim(height):
-            break
-        cell = 0.1 if width < 1 else 0.2
-        margin = round(max(GAP_M, GAP_SHARE * width) / cell)
-        reach = round(width / cell)
-        n = round(SHIFT_M / cell) + reach + margin + 1
-        summed = _summed(s, t, h, cell, n, level, n_levels)
-        within = _boxes(summed, reach)[:, margin:-margin, margin:-margin]
-        free = (within > 0) & (_boxes(summed, reach + margin) == within)
+    prisms = [_Prism.of(width) for width in WIDTHS_M if width <= slim(height)]
+    summed: dict[float, np.ndarray] = {}
+    for width, prism in zip(WIDTHS_M, prisms, strict=False):
+        cell, reach, margin = prism.cell, prism.reach, prism.margin
+        if cell not in summed:
+            n = max(other.n for other in prisms if other.cell == cell)
+            summed[cell] = _summed(s, t, h, cell, n, level, n_levels)
+        around = prism.crop(summed[cell])
+        within = _boxes(around, reach)[:, margin:-margin, margin:-margin]
+        free = (within > 0) & (_boxes(around, reach + margin) == within)
         count = free.sum(axis=0)
         share = float(count.max()) / n_levels
         worth = share * WIDER ** np.log2(width / WIDTHS_M[0])
@@ -159,6 +160,35 @@ def _search(
     return best
 
 
+class _Prism(NamedTuple):
+    """A prism of constant width and the air around it, in cells.
+
+    Attributes:
+        cell: m.
+        reach: cells from its axis to its side.
+        margin: cells of free air beside it.
+        n: cells from the approximate axis to the furthest that matters.
+    """
+
+    cell: float
+    reach: int
+    margin: int
+    n: int
+
+    @classmethod
+    def of(cls, width: float) -> _Prism:
+        """The prism with this half width in m."""
+        cell = 0.1 if width < 1 else 0.2
+        reach, margin = round(width / cell), round(max(GAP_M, GAP_SHARE * width) / cell)
+        return cls(cell, reach, margin, round(SHIFT_M / cell) + reach + margin + 1)
+
+    def crop(self, summed: np.ndarray) -> np.ndarray:
+        """The part of the sums (L, C, C) of a wider prism that this one needs."""
+        beside = (summed.shape[1] - 1) // 2 - self.n
+        inside = slice(beside, summed.shape[1] - beside)
+        return summed[:, inside, inside]
+
+
 def _summed(
     s: np.ndarray, t: np.ndarray, h: np.ndarray, cell: float, n: int, level: float, n_levels: int
 ) -> np.ndarray:
@@ -169,9 +199,12 @@ def _summed(
     k = np.floor(h / level).astype(int)
     size = 2 * n + 1
     inside = (i >= 0) & (i < size) & (j >= 0) & (j < size) & (k >= 0) & (k < n_levels)
-    flat = np.ravel_multi_index((k[inside], i[inside], j[inside]), (n_levels, size, size))
-    count = np.bincount(flat, minlength=n_levels * size * size).reshape(n_levels, size, size)
-    return np.pad(count, ((0, 0), (1, 0), (1, 0))).cumsum(axis=1).cumsum(axis=2)
+    shape = n_levels, size + 1, size + 1
+    cells = np.ravel_multi_index((k[inside], i[inside] + 1, j[inside] + 1), shape)
+    summed = np.zeros(shape, np.int32)
+    np.add.at(summed.reshape(-1), cells, 1)
+    np.cumsum(summed, axis=1, dtype=np.int32, out=summed)
+    return np.cumsum(summed, axis=2, dtype=np.int32, out=summed)
 
 
 def _boxes(summed: np.ndarray, reach: int) -> np.ndarray:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import OrderedDict, defaultdict
 from collections.abc import Callable
-from functools import lru_cache
 
 import numpy as np
 
@@ -16,6 +15,10 @@ KEPT_TILES = 64
 KEPT_POINTS = 9
 """Tiles of points kept in memory: those around a tower. A tile of a dense survey takes 30 MB."""
 
+KEPT_IN_ALL = 2_000_000
+"""Positions kept in memory, in more tiles where they are small: 48 MB. On a slope, more tiles than
+``KEPT_POINTS`` are around a tower."""
+
 
 class SurveySurroundings:
     """What is near a place; each tile is read when a look-up needs it."""
@@ -25,13 +28,14 @@ class SurveySurroundings:
 
         Args:
             read: gives the positions (n, 3) m in the tile with a code.
-            kept: largest number of tiles in memory.
+            kept: number of tiles in memory; more are kept up to ``KEPT_IN_ALL`` positions.
         """
         self._edge = EDGE * spool.voxel_size
         self._above: dict[tuple[int, int], list[int]] = defaultdict(list)
         for code, (_, y, x) in spool.places():
             self._above[x, y].append(code)
-        self._positions = lru_cache(maxsize=kept)(read)
+        self._read, self._kept = read, kept
+        self._tiles: OrderedDict[int, np.ndarray] = OrderedDict()
 
     def __call__(self, place: np.ndarray, radius: float) -> np.ndarray:
         """(M, 3) m, the positions within a planar radius in m of a place (2,)."""
@@ -44,6 +48,18 @@ class SurveySurroundings:
                     apart = np.hypot(positions[:, 0] - place[0], positions[:, 1] - place[1])
                     near.append(positions[apart <= radius])
         return np.concatenate(near)
+
+    def _positions(self, code: int) -> np.ndarray:
+        """(n, 3) m, the positions in a tile. Those that were used last stay in memory."""
+        if code not in self._tiles:
+            self._tiles[code] = self._read(code)
+            while (
+                len(self._tiles) > self._kept
+                and sum(len(tile) for tile in self._tiles.values()) > KEPT_IN_ALL
+            ):
+                self._tiles.popitem(last=False)
+        self._tiles.move_to_end(code)
+        return self._tiles[code]
 
 
 def occupied_voxels(spool: TileSpool) -> SurveySurroundings:

@@ -95,7 +95,9 @@ def section_of(occupancy: Occupancy, offsets: np.ndarray, *, hollow: bool) -> Se
     arguments = (occupancy.index, occupancy.offsets, occupancy.shape, offsets)
     _mark(*arguments, needed, starts)
     at = np.flatnonzero(needed)
-    row_of = np.cumsum(needed, dtype=np.int32) - 1
+    # Only where it is needed: the rest of this memory is never touched.
+    row_of = np.empty(len(needed), np.int32)
+    row_of[at] = np.arange(len(at), dtype=np.int32)
     rows = np.empty(int(starts[-1]), np.int32)
     _fill(*arguments, row_of, rows)
     return Section(at, starts, rows)

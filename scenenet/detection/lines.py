@@ -6,6 +6,7 @@ conductor hangs in air. The points say so at any density, above trees and betwee
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numba
@@ -44,6 +45,9 @@ LINE = Line(LINE_M, LINE_THICK_M, *RING_M, LINE_BESIDE, LINE_PIECES, RISE)
 CELL_M = 1.0
 """m, cells in which neighbours are looked up."""
 
+ROUNDING = 1e-6
+"""m, added where a cell is left out because no point in it can matter."""
+
 AZIMUTHS, SLOPES = 60, 10
 """Number of directions among which those of lines are looked for: about 3 degrees, as wide as a
 line at ``LINE_M``."""
@@ -64,6 +68,7 @@ class Grid(NamedTuple):
 
     Attributes:
         x, y, z: (N,) m.
+        origin: (3,) m, lowest corner of the first cell.
         shape: (3,) number of cells.
         starts: (C + 1,) where the points of each cell start, with the cells of a column one after
             another.
@@ -72,6 +77,7 @@ class Grid(NamedTuple):
     x: np.ndarray
     y: np.ndarray
     z: np.ndarray
+    origin: np.ndarray
     shape: np.ndarray
     starts: np.ndarray
 
@@ -90,27 +96,42 @@ def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray,
     """
     if len(tested) == 0:
         return np.empty(0, np.int64), np.empty((0, 3))
-    cells = np.floor((points - points.min(axis=0)) / CELL_M).astype(np.int64)
-    grid = _grid(points, cells)
+    grid, cells = _grid(points)
     step = len(tested) // SAMPLE
     if step > 1:
         few = tested[::step]
-        if not _on_lines(grid, points[few], cells[few], LINE)[0].any():
+        if not _in_threads(grid, points[few], cells[few])[0].any():
             return np.empty(0, np.int64), np.empty((0, 3))
-    on_line, direction = _on_lines(grid, points[tested], cells[tested], LINE)
+    on_line, direction = _in_threads(grid, points[tested], cells[tested])
     rows, direction = tested[on_line], direction[on_line]
     same = _continued(points[rows], direction)
     return rows[same], direction[same]
 
 
-def _grid(points: np.ndarray, cells: np.ndarray) -> Grid:
-    """The points (N, 3) m by their cells (N, 3)."""
+def _grid(points: np.ndarray) -> tuple[Grid, np.ndarray]:
+    """The points (N, 3) m by their cells, and the cell (N, 3) of each."""
+    origin = points.min(axis=0)
+    cells = np.floor((points - origin) / CELL_M).astype(np.int64)
     shape = cells.max(axis=0) + 1
     number = np.ravel_multi_index(tuple(cells.T), tuple(shape))
     x, y, z = np.ascontiguousarray(points[np.argsort(number, kind="stable")].T)
     starts = np.zeros(int(shape.prod()) + 1, np.int64)
     np.cumsum(np.bincount(number, minlength=len(starts) - 1), out=starts[1:])
-    return Grid(x, y, z, shape, starts)
+    return Grid(x, y, z, origin, shape, starts), cells
+
+
+def _in_threads(grid: Grid, places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """``_on_lines`` with a share of the places for each processor."""
+    threads = numba.get_num_threads()
+    shares = zip(
+        np.array_split(np.ascontiguousarray(places), threads),
+        np.array_split(np.ascontiguousarray(cells), threads),
+        strict=True,
+    )
+    with ThreadPoolExecutor(threads) as pool:
+        parts = list(pool.map(lambda share: _on_lines(grid, *share, LINE), shares))
+    found, direction = zip(*parts, strict=True)
+    return np.concatenate(found), np.concatenate(direction)
 
 
 def _continued(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -132,7 +153,7 @@ def _continued(points: np.ndarray, direction: np.ndarray) -> np.ndarray:
     return np.bincount(pieces, minlength=len(points)) >= LINE_PIECES - 1
 
 
-@numba.njit(**COMPILED)
+@numba.njit(nogil=True, **COMPILED)
 def _on_lines(grid, places, cells, line):  # pragma: no cover - compiled
     """Whether each place (M, 3) m, a point in the cell (M, 3) of ``grid``, is on a line, (M,) bool,
     and unit vectors (M, 3) along the best lines tried."""
@@ -144,11 +165,10 @@ def _on_lines(grid, places, cells, line):  # pragma: no cover - compiled
     votes = np.empty(AZIMUTHS * SLOPES + 1, np.int32)
     towards = np.empty((AZIMUTHS * SLOPES + 1, 3))
     u, middle = np.empty(3), np.empty(3)
-    high = _levels_around(line)
     for row in range(len(places)):
         if _in_crown(grid, places[row], cells[row], line):
             continue
-        n = _neighbours(grid, places[row], cells[row], line, high, near)
+        n = _neighbours(grid, places[row], cells[row], line, near)
         x, y, z, square = near[0, :n], near[1, :n], near[2, :n], near[3, :n]
         _vote(x, y, z, line, way[:n], votes, towards)
         best = 0
@@ -168,32 +188,26 @@ def _on_lines(grid, places, cells, line):  # pragma: no cover - compiled
 
 
 @numba.njit(**COMPILED)
-def _levels_around(line):  # pragma: no cover - compiled
-    """(S, S) cells above and below a cell that may have points of a line through it, for columns
-    0 to S - 1 cells away along each axis."""
-    steps = int(np.ceil(line.reach / CELL_M)) + 1
-    high = np.empty((steps, steps), np.int64)
-    for a in range(steps):
-        for b in range(steps):
-            far = (np.hypot(a, b) + 1.5) * CELL_M
-            high[a, b] = int((line.rise * far + line.outer) / CELL_M) + 1
-    return high
-
-
-@numba.njit(**COMPILED)
-def _neighbours(grid, place, cell, line, high, near):  # pragma: no cover - compiled
+def _neighbours(grid, place, cell, line, near):  # pragma: no cover - compiled
     """Write the offsets of the neighbours of a place that may lie on a line through it, or beside
     one, and their squared lengths, into ``near`` (4, N); returns their number."""
     n = 0
     px, py, pz = place
+    gx, gy, gz = px - grid.origin[0], py - grid.origin[1], pz - grid.origin[2]
     x, y, z, square = near[0], near[1], near[2], near[3]
-    steps = len(high) - 1
+    steps = int(np.ceil(line.reach / CELL_M))
     for a in range(max(cell[0] - steps, 0), min(cell[0] + steps + 1, grid.shape[0])):
+        west, east = gx - a * CELL_M, (a + 1) * CELL_M - gx
         for b in range(max(cell[1] - steps, 0), min(cell[1] + steps + 1, grid.shape[1])):
+            south, north = gy - b * CELL_M, (b + 1) * CELL_M - gy
+            beside = max(-west, -east, 0.0) ** 2 + max(-south, -north, 0.0) ** 2
+            if beside > line.reach**2 + ROUNDING:
+                continue
+            far = np.sqrt(max(west, east) ** 2 + max(south, north) ** 2)
+            high = line.rise * min(far, line.reach) + line.outer + ROUNDING
             column = (a * grid.shape[1] + b) * grid.shape[2]
-            levels = high[abs(a - cell[0]), abs(b - cell[1])]
-            first = column + max(cell[2] - levels, 0)
-            last = column + min(cell[2] + levels + 1, grid.shape[2])
+            first = column + max(int(np.floor((gz - high) / CELL_M)), 0)
+            last = column + min(int(np.floor((gz + high) / CELL_M)) + 1, grid.shape[2])
             for k in range(grid.starts[first], grid.starts[last]):
                 dx, dy, dz = grid.x[k] - px, grid.y[k] - py, grid.z[k] - pz
                 planar = dx * dx + dy * dy

@@ -45,8 +45,11 @@ class SurveySurroundings:
             for y in range(low[1], high[1] + 1):
                 for code in self._above.get((x, y), ()):
                     positions = self._positions(code)
-                    apart = np.hypot(positions[:, 0] - place[0], positions[:, 1] - place[1])
-                    near.append(positions[apart <= radius])
+                    # Most of a tile is further away on one axis, which a comparison shows.
+                    rows = np.flatnonzero(np.abs(positions[:, 0] - place[0]) <= radius)
+                    rows = rows[np.abs(positions[rows, 1] - place[1]) <= radius]
+                    apart = np.hypot(*(positions[rows, :2] - place).T)
+                    near.append(positions[rows[apart <= radius]])
         return np.concatenate(near)
 
     def _positions(self, code: int) -> np.ndarray:

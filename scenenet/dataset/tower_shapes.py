@@ -77,10 +77,11 @@ def measure_shape(crop: Crop, cloud: PointCloud) -> TowerShape | None:
     origin = np.array([*centre, labelled[:, 2].min()])
     points, height = cloud.xyz[near] - origin, float(np.ptp(labelled[:, 2]))
     axis, crossarm = np.zeros(2), max(3.0, CROSSARM * height)
-    conductors = ConductorPoints(surroundings_in(points), LOWEST_M)
+    around = surroundings_in(points)
+    conductors = ConductorPoints(around, LOWEST_M)
 
     def leaving(axis: np.ndarray, base: float, height: float, crossarm: float) -> list[Span]:
-        return conductors.leaving(axis, base, height, crossarm, points)
+        return conductors.leaving(axis, base, height, crossarm, around)
 
     structure = measure_structure(points, leaving, axis, 0.0, height, crossarm, TESTS, amid=False)
     return None if structure is None else shape_of(structure, points)

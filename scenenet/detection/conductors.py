@@ -83,7 +83,7 @@ class ConductorPoints:
         self._block = lru_cache(maxsize=BLOCKS_KEPT)(self._in_block)
 
     def leaving(
-        self, axis: np.ndarray, base: float, height: float, crossarm: float, around: np.ndarray
+        self, axis: np.ndarray, base: float, height: float, crossarm: float, around: Surroundings
     ) -> list[Span]:
         """Directions in which conductors leave a tower, the longest first.
 
@@ -91,7 +91,8 @@ class ConductorPoints:
             axis: (2,) m.
             base, height: m, elevation of its foot and height above it.
             crossarm: m, largest distance at which a conductor passes the axis.
-            around: (N, 3) m, what is around the tower; it shows where the data end.
+            around: gives what is around the tower, which shows where the data end. Most places
+                have no conductor, and it is not looked up there.
         """
         foot = np.array([*axis, base])
         places, directions, others = self._near(axis, float(np.hypot(FAR, crossarm)))
@@ -99,9 +100,12 @@ class ConductorPoints:
         distance = np.hypot(offset[:, 0], offset[:, 1])
         here = (distance >= NEAR) & (offset[:, 2] >= HEAD * height)
         here &= offset[:, 2] <= height + RISE * distance
+        if not here.any():
+            return []
         level = np.hypot(directions[here, 0], directions[here, 1])
         heading, slope = directions[here, :2] / level[:, None], directions[here, 2] / level
-        spans = _spans(offset[here], heading, slope, around - foot, crossarm)
+        near = around(axis, FAR + max(SCALES)) - foot
+        spans = _spans(offset[here], heading, slope, near, crossarm)
         spans = [replace(span, places=span.places + foot) for span in spans]
         return [
             span
@@ -267,9 +271,10 @@ def _angle(bearing: np.ndarray, middle: float) -> np.ndarray:
 
 
 def _longest_run(s: np.ndarray, gap: float = GAP) -> float:
-    """m, longest stretch of the positions (M,) m without a gap over ``gap`` m."""
+    """m, longest stretch of the positions (M,) m, none below 0, without a gap over ``gap`` m."""
     if len(s) == 0:
         return 0.0
-    metres = np.unique(np.floor(s))
-    parts = np.split(metres, np.flatnonzero(np.diff(metres) > gap) + 1)
-    return float(max(part[-1] - part[0] + 1 for part in parts))
+    metres = np.flatnonzero(np.bincount(s.astype(np.int64)))
+    breaks = np.flatnonzero(np.diff(metres) > gap)
+    first, last = metres[np.append(0, breaks + 1)], metres[np.append(breaks, -1)]
+    return float((last - first).max() + 1)

@@ -127,16 +127,14 @@ def _in_points(
     tower is.
     """
     axis = np.array([rough.x, rough.y])
-    near = points(axis + offset[:2], SURROUNDINGS_M) - offset
     sure = rough.probability >= tau
     tests = BodyTests(settings.min_height, settings.min_upright, MIN_FREE)
     needed = settings.min_conductor * (1 if sure else 2)
     found: list[MeasuredTower] = []
 
     def leaving(axis: np.ndarray, base: float, height: float, crossarm: float) -> list[Span]:
-        around = surroundings(axis + offset[:2], SURROUNDINGS_M)
         foot = base + offset[2]
-        spans = conductors.leaving(axis + offset[:2], foot, height, crossarm, around)
+        spans = conductors.leaving(axis + offset[:2], foot, height, crossarm, surroundings)
         return [replace(span, places=span.places - offset) for span in spans]
 
     # The cheapest test first: most trees have no conductor anywhere near.
@@ -144,6 +142,7 @@ def _in_points(
     seen = leaving(axis, rough.base, rough.height, wide) if needed else []
     if sum(span.followed for span in seen) < needed / 2:
         return []
+    near = points(axis + offset[:2], SURROUNDINGS_M) - offset
     for amid in (False, True):
         share = settings.crossarm * (WIDE if amid else 1)
         crossarm = min(max(settings.eps / 2, share * rough.height), WIDEST_HEAD_M)

@@ -40,8 +40,8 @@ def ground(n=3000, seed=2):
 
 def spans(*parts, crossarm=5.0, height=HEIGHT):
     points = np.concatenate([ground(), *parts])
-    found = ConductorPoints(surroundings_in(points), 4.5)
-    return found.leaving(AXIS, 0.0, height, crossarm, points)
+    around = surroundings_in(points)
+    return ConductorPoints(around, 4.5).leaving(AXIS, 0.0, height, crossarm, around)
 
 
 @pytest.mark.parametrize("spacing", [0.05, 0.3, 1.2, 2.0])
@@ -108,9 +108,9 @@ def test_the_place_of_the_blocks_hardly_matters():
     parts = [conductor(t, 17, bearing=40.0) for t in (-2.0, 0.0, 2.0)]
     here = spans(*parts)
     away = np.array([13.7, 21.3, 0.0])
-    points = np.concatenate([ground(), *parts]) + away
-    found = ConductorPoints(surroundings_in(points), 4.5)
-    there = found.leaving(AXIS + away[:2], 0.0, HEIGHT, 5.0, points)
+    around = surroundings_in(np.concatenate([ground(), *parts]) + away)
+    found = ConductorPoints(around, 4.5)
+    there = found.leaving(AXIS + away[:2], 0.0, HEIGHT, 5.0, around)
     assert [round(s.bearing) for s in here] == [round(s.bearing) for s in there]
     assert [s.followed for s in here] == pytest.approx([s.followed for s in there], abs=0.15)
 

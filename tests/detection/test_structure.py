@@ -16,10 +16,11 @@ def measured(scene, height, away=(0.8, -0.7), tests=ANY, amid=False):
     axis = scene.foot[:2] + away
     near = np.hypot(*(scene.xyz[:, :2] - axis).T) <= 28
     crossarm, base = max(3.0, 0.25 * height), scene.foot[2]
-    conductors = ConductorPoints(surroundings_in(scene.xyz), 4.5)
+    around = surroundings_in(scene.xyz)
+    conductors = ConductorPoints(around, 4.5)
 
     def leaving(*where):
-        return conductors.leaving(*where, around=scene.xyz)
+        return conductors.leaving(*where, around=around)
 
     return measure_structure(scene.xyz[near], leaving, axis, base, height, crossarm, tests, amid)
 

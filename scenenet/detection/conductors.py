@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from scenenet.detection.candidates import SURROUNDINGS_M
 from scenenet.detection.conductor_rules import (
     ALONE_M,
     ATTACHED,
@@ -104,7 +105,7 @@ class ConductorPoints:
             return []
         level = np.hypot(directions[here, 0], directions[here, 1])
         heading, slope = directions[here, :2] / level[:, None], directions[here, 2] / level
-        near = around(axis, FAR + max(SCALES)) - foot
+        near = around(axis, SURROUNDINGS_M) - foot
         spans = _spans(offset[here], heading, slope, near, crossarm)
         spans = [replace(span, places=span.places + foot) for span in spans]
         return [

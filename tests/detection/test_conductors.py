@@ -20,8 +20,9 @@ def spans(points, *parts, height=HEIGHT, crossarm=4.0):
 
 def leaving(everything, foot, height=HEIGHT, crossarm=4.0):
     """Spans that leave a pole at ``foot`` (3,) m among the points ``everything``."""
-    found = ConductorPoints(surroundings_in(everything), 4.5)
-    return found.leaving(foot[:2], float(foot[2]), height, crossarm, everything)
+    around = surroundings_in(everything)
+    found = ConductorPoints(around, 4.5)
+    return found.leaving(foot[:2], float(foot[2]), height, crossarm, around)
 
 
 def test_a_lone_pole_has_no_conductors(points):

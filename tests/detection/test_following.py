@@ -17,8 +17,8 @@ def leads(points, *parts):
     everything = points.together(points.column(0, 0, 0, HEIGHT), *parts)
     axis = points.place[:2] + 0.5
     base = float(points.place[2])
-    found = ConductorPoints(surroundings_in(everything), 4.5)
-    spans = found.leaving(axis, base, HEIGHT, 4.0, everything)
+    around = surroundings_in(everything)
+    spans = ConductorPoints(around, 4.5).leaving(axis, base, HEIGHT, 4.0, around)
     assert spans
     occupied = np.unique(np.floor(everything), axis=0) + 0.5
     return [leads_on(span, axis, base, occupied, 1.0) for span in spans]

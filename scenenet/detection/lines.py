@@ -245,19 +245,19 @@ def _in_crown(grid, place, cell, line):  # pragma: no cover - compiled
     trace = xx + yy + zz
     # The largest eigenvalue, by squaring: the variance along the line.
     scale = max(trace, 1e-12)
-    a, b, c, d, e, f = xx / scale, xy / scale, xz / scale, yy / scale, yz / scale, zz / scale
+    p, q, r, s, t, w = xx / scale, xy / scale, xz / scale, yy / scale, yz / scale, zz / scale
     for _ in range(4):
-        a, b, c, d, e, f = (
-            a * a + b * b + c * c,
-            a * b + b * d + c * e,
-            a * c + b * e + c * f,
-            b * b + d * d + e * e,
-            b * c + d * e + e * f,
-            c * c + e * e + f * f,
+        p, q, r, s, t, w = (
+            p * p + q * q + r * r,
+            p * q + q * s + r * t,
+            p * r + q * t + r * w,
+            q * q + s * s + t * t,
+            q * r + s * t + t * w,
+            r * r + t * t + w * w,
         )
-        scale = max(a + d + f, 1e-300)
-        a, b, c, d, e, f = a / scale, b / scale, c / scale, d / scale, e / scale, f / scale
-    along = a * xx + d * yy + f * zz + 2 * (b * xy + c * xz + e * yz)
+        scale = max(p + s + w, 1e-300)
+        p, q, r, s, t, w = p / scale, q / scale, r / scale, s / scale, t / scale, w / scale
+    along = p * xx + s * yy + w * zz + 2 * (q * xy + r * xz + t * yz)
     return trace - along > line.thick**2
 
 

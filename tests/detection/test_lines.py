@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 import pytest
 
@@ -129,6 +130,20 @@ def test_points_on_a_line_get_its_direction():
 def test_a_stray_point_far_above_or_below_takes_no_memory(z):
     (span,) = spans(conductor(1.5, 17), np.array([[*AXIS, z]]))
     assert span.followed == 1
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="there is one processor")
+def test_the_number_of_threads_does_not_matter():
+    points = np.concatenate([conductor(0, 17, bearing=30.0), crown(8, -8, 3, 18, 2000)])
+    threads, found = numba.get_num_threads(), []
+    try:
+        for number in (1, 2):
+            numba.set_num_threads(number)
+            found.append(points_on_lines(points, np.arange(len(points))))
+    finally:
+        numba.set_num_threads(threads)
+    for one, two in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, two)
 
 
 def test_without_points_there_is_no_line():

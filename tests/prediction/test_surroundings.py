@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.prediction.surroundings import occupied_voxels, survey_points
+from scenenet.prediction import surroundings
+from scenenet.prediction.surroundings import SurveySurroundings, occupied_voxels, survey_points
 from scenenet.prediction.tiling import TileSpool
 
 ORIGIN = np.array([544_000.0, 4_634_000.0, 80.0])
@@ -44,6 +45,34 @@ def test_points_are_those_of_the_survey(spool, radius):
     np.testing.assert_allclose(
         found[np.lexsort(found.T)], near[np.lexsort(near.T)], rtol=0, atol=1e-5
     )
+
+
+def test_small_tiles_are_read_once(spool):
+    reads = []
+
+    def read(code):
+        reads.append(code)
+        return spool.points(code)
+
+    near = SurveySurroundings(spool, read, kept=2)
+    for _ in range(2):
+        near(ORIGIN[:2], 1000.0)
+    assert sorted(reads) == [code for code, _ in spool.places()]
+
+
+def test_large_tiles_do_not_all_stay_in_memory(spool, monkeypatch):
+    monkeypatch.setattr(surroundings, "KEPT_IN_ALL", 0)
+    reads = []
+
+    def read(code):
+        reads.append(code)
+        return spool.points(code)
+
+    near = SurveySurroundings(spool, read, kept=2)
+    near(ORIGIN[:2], 1000.0)
+    assert len(near._tiles) == 2
+    near(ORIGIN[:2], 1000.0)
+    assert len(reads) == 2 * len(spool)
 
 
 def test_a_survey_without_points_has_none(tmp_path):

@@ -75,7 +75,9 @@ def judge(claim: Claim, evidence: Evidence) -> Judged:
     """
     found = claim.measure(evidence)
     if found is None:
-        return Judged(claim, None, OPEN, "Not measured in this run.")
+        needed = " and ".join(what for what, _ in claim.skilled)
+        seen = f", or no seed of {needed} detects anything" if needed else ""
+        return Judged(claim, None, OPEN, f"Not measured in this run{seen}.")
     for what, scores in claim.skilled:
         if (lack := evidence.lack_of_skill(scores(evidence))) is not None:
             return Judged(claim, found, OPEN, f"{what[:1].upper()}{what[1:]} {lack}.")

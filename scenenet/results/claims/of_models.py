@@ -165,7 +165,7 @@ CLAIMS = (
     ),
     Claim(
         "times.training", "5.2.6", "SCENE-Net is trained in less than 90 minutes.",
-        "training time of SCENE-Net, minutes", (0.0, MOST_MINUTES),
+        "training time of SCENE-Net, minutes", (-np.inf, MOST_MINUTES),
         lambda e: intervals.mean(_minutes(e, "scenenet")), timed=True,
     ),
     Claim(

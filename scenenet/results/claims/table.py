@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pandas as pd
@@ -44,7 +45,8 @@ def write_claims(results: Results, thesis: Thesis, out: str | Path, out_times: s
 
 def _row(judged: Judged) -> tuple[object, ...]:
     claim, found = judged.claim, judged.found
-    bounds = [None if abs(bound) == float("inf") else round(bound, 12) for bound in claim.asserted]
+    # The bound of "above 0" is the least number above it, which reads as 0.
+    bounds = [None if math.isinf(b) else round(b, 12) + 0.0 for b in claim.asserted]
     measured = (None, None, None, None) if found is None else found
     return (claim.name, claim.place, claim.says, claim.statistic, *bounds, *measured,
             judged.verdict, judged.remark)  # fmt: skip

@@ -12,7 +12,7 @@ from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
 from scenenet.dataset.voxels import median_voxel_size
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.answers import rules_on
+from scenenet.evaluation.answers import Answering, no_answer, rules_on
 from scenenet.evaluation.scoring import score_predictions
 from scenenet.models.settings import BOOSTED_TREES
 
@@ -30,6 +30,7 @@ def evaluate_boosted_trees(
 
     Args:
         voxel_manifests, crop_manifests: of the stores of voxels, and of the crops they are of.
+            Without crops, whole towers and points are not scored.
         outs: JSON file of each seed: the result of ``score_predictions``, with ``parameters``.
         out_times: JSON file: ``training_seconds`` of each seed, ``inference_ms`` by voxels per edge
             (``scenenet.evaluation.inference_time``), and ``peak_memory_mb`` of the whole call.
@@ -54,7 +55,9 @@ def evaluate_boosted_trees(
         seconds.append(time.perf_counter() - begin)
         model = boosted_trees.tune(grown, parts["validation"].samples)
         tau = model.threshold()
-        answer = rules_on(clouds, model.probabilities, tau, size, detection)
+        answer: Answering = no_answer
+        if crop_manifests:
+            answer = rules_on(clouds, model.probabilities, tau, size, detection)
         scores = score_predictions(
             BOOSTED_TREES, seed, tau, model.probabilities, parts["test"], answer
         )

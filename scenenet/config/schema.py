@@ -119,10 +119,10 @@ class Config(Settings):
         min_length=1, description="every model is trained once from each seed"
     )
     tuning: TuningSettings = TuningSettings()
-    score_points: bool = Field(
+    score_towers: bool = Field(
         True,
-        description="whether the points of the test crops are scored too, as predict answers them; "
-        "it takes far longer than the scores of voxels",
+        description="whether the whole towers of the test crops are scored too, and their points, "
+        "as predict answers them; it takes far longer than the scores of voxels at or above tau",
     )
     study_values: Mapping[str, Any] = Field(
         {},
@@ -186,6 +186,16 @@ class Config(Settings):
         ):
             if twice := [str(name) for name, count in Counter(names).items() if count > 1]:
                 raise ValueError(f"{what}: {', '.join(twice)} is listed more than once")
+        whole = [
+            model.name
+            for model in self.models
+            if model.protocol == "operational" and model.metric.whole_towers
+        ]
+        if whole and not self.score_towers:
+            raise ValueError(
+                f"score_towers: {', '.join(whole)} gives whole towers, so they have to be scored; "
+                "remove this setting, or set metric.whole_towers: false"
+            )
         known = [model.name for model in self.models]
         if self.predict.model not in known:
             raise ValueError(

@@ -64,8 +64,9 @@ class Answer:
         return None if self.towers is None else match_towers(self.towers, true)
 
 
-Answering = Callable[[VoxelSample], Answer]
-"""A crop on the grid of the data set -> what is tower in it."""
+Answering = Callable[[VoxelSample], Answer | None]
+"""A crop on the grid of the data set -> what is tower in it; None where whole towers are not looked
+for."""
 
 
 def at_or_above_tau(cloud: PointCloud, sample: VoxelSample, predict: Predict, tau: float) -> Answer:
@@ -129,9 +130,13 @@ def rules_on(
     tau: float,
     voxel_size: float,
     detection: DetectionSettings,
-) -> Answering:
+) -> Callable[[VoxelSample], Answer]:
     """The answer ``with_rules`` for each crop whose points are in ``clouds`` by its id."""
     return lambda sample: with_rules(clouds[sample.id], sample, predict, tau, voxel_size, detection)
+
+
+def no_answer(sample: VoxelSample) -> None:
+    """Whole towers are not looked for."""
 
 
 def places_of(towers: Sequence[MeasuredTower | SurveyTower]) -> np.ndarray:

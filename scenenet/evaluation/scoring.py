@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from scenenet.core.errors import InputError
 from scenenet.core.progress import track
 from scenenet.dataset.crops import Crop, CropClouds
 from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.answers import Answer, Answering, Predict, rules_on
+from scenenet.evaluation.answers import Answer, Answering, Predict, no_answer, rules_on
 from scenenet.evaluation.points import PointCounts
 from scenenet.evaluation.result import (
     Evaluation,
@@ -49,15 +50,23 @@ def evaluate(
 
     Args:
         voxel_manifests, crop_manifests: of the stores of voxels, and of the crops they are of.
+            Without crops, whole towers and points are not scored.
+
+    Raises:
+        InputError: the model gives whole towers, and there are no crops.
     """
     trained, card = read_model(model)
-    answer = rules_on(
-        CropClouds(crop_manifests),
-        predictor(trained, card),
-        card.threshold(),
-        trained.observed_size(card.voxel_size),
-        detection,
-    )
+    if trained.whole_towers and not crop_manifests:
+        raise InputError(f"{card.name} gives whole towers, which need the crops", file=model)
+    answer: Answering = no_answer
+    if crop_manifests:
+        answer = rules_on(
+            CropClouds(crop_manifests),
+            predictor(trained, card),
+            card.threshold(),
+            trained.observed_size(card.voxel_size),
+            detection,
+        )
     dataset = load(voxel_manifests, crops_in(split, part))
     return replace(score(trained, card, dataset, answer), part=part)
 
@@ -127,25 +136,30 @@ class _Against:
         self,
         sample: VoxelSample,
         probability: np.ndarray,
-        of_a_tower: np.ndarray,
         true: np.ndarray,
-        match: TowerMatch,
+        places: np.ndarray,
+        answer: Answer | None,
         points: Confusion | None,
     ) -> None:
         """Count a sample.
 
         Args:
             probability: (V,) of every voxel.
-            of_a_tower: (V,) whether it belongs to a detected tower.
             true: (V,) bool, whether it is tower.
-            points: counts of its points; None if they were not counted.
+            places: (T, 4) m, the towers, as in ``scenenet.dataset.crops.Crop``.
+            answer: its whole towers; None if they were not looked for.
+            points: counts of its points; None as ``answer``.
         """
         observer = confusion(probability, true, self._tau)
-        towers = confusion(of_a_tower, true, 0.5)
-        chosen, level = (of_a_tower, 0.5) if self._whole_towers else (probability, self._tau)
+        chosen, towers, match = probability >= self._tau, Confusion(), TowerMatch.none()
+        if answer is not None:
+            of_a_tower = answer.among(len(true))
+            towers = Confusion.of(of_a_tower, true)
+            match = answer.match(places) or match
+            chosen = of_a_tower if self._whole_towers else chosen
         self.observer += observer
         self._towers += towers
-        self._occupied += confusion(chosen[sample.index], true[sample.index], level)
+        self._occupied += Confusion.of(chosen[sample.index], true[sample.index])
         self._curve += ThresholdCurve.of(probability, true)
         self._match += match
         if points is not None:
@@ -188,17 +202,17 @@ class _Tally:
         crop: Crop,
         probability: np.ndarray,
         labelled: np.ndarray,
-        answer: Answer,
+        answer: Answer | None,
     ) -> None:
         """Count a sample with the probability (V,) and label (V,) bool of every voxel."""
-        of_a_tower = answer.among(len(probability))
-        match = answer.match(crop.towers) or TowerMatch.none()
-        self._points += answer.points
-        self._labels.add(sample, probability, of_a_tower, labelled, match, answer.points.labels)
+        points = None if answer is None else answer.points
+        self._points += points or PointCounts()
+        of_labels = None if points is None else points.labels
+        self._labels.add(sample, probability, labelled, crop.towers, answer, of_labels)
         true = sample.truth()
         if true is not None and crop.true_towers is not None:
-            match = answer.match(crop.true_towers) or TowerMatch.none()
-            self._truth.add(sample, probability, of_a_tower, true, match, answer.points.truth)
+            of_truth = None if points is None else points.truth
+            self._truth.add(sample, probability, true, crop.true_towers, answer, of_truth)
 
     def evaluation(self, name: str, seed: int | None) -> Evaluation:
         """The scores of all samples."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 from scenenet.detection.settings import DetectionSettings
 from scenenet.evaluation.scoring import evaluate
@@ -51,3 +52,22 @@ def test_a_model_that_gives_whole_towers_is_scored_by_them(whole, chain, pole_fi
     )  # fmt: skip
     assert result.whole_towers == (given.voxel if whole else None)
     assert result.decisive == (given.voxel.f05 or 0.0, given.voxel_observer.f05 or 0.0)
+
+
+def test_without_crops_whole_towers_are_not_scored(chain, pole_finder, tmp_path):
+    write_model(tmp_path / "m.json", *pole_finder)
+    files = tmp_path / "m.json", [chain.voxels]
+    found = evaluate(*files, [], chain.split, LONE_POLES)
+    full = evaluate(*files, [chain.crops], chain.split, LONE_POLES)
+    assert (found.voxel, found.voxel_occupied) == (full.voxel, full.voxel_occupied)
+    assert found.points is None and full.points is not None
+    assert found.voxel_towers.f05 is None and full.voxel_towers.f05 > 0
+    assert (found.towers.precision, found.towers.n_true) == (None, 0)
+
+
+def test_whole_towers_of_a_model_cannot_be_scored_without_crops(chain, pole_finder, tmp_path):
+    settings = ModelSettings(name="m", kind="scenenet", protocol="operational")
+    card = pole_finder[1].model_copy(update={"name": "m"})
+    write_model(tmp_path / "m.json", new_model(settings, 0), card)
+    with pytest.raises(InputError, match="m gives whole towers, which need the crops"):
+        evaluate(tmp_path / "m.json", [chain.voxels], [], chain.split, LONE_POLES)

@@ -6,8 +6,8 @@ rule evaluate:
         model=lambda w: tuned_file(w.model, w.seed),
         stores=every("voxels", "store"),
         manifests=every("voxels", "manifest"),
-        crop_stores=every("crops", "store") if settings.score_points else [],
-        crops=every("crops", "manifest") if settings.score_points else [],
+        crop_stores=every("crops", "store") if settings.score_towers else [],
+        crops=every("crops", "manifest") if settings.score_towers else [],
         split=f"{R}/split/split.csv",
     output:
         scores=f"{R}/evaluate/{{model}}/seed-{{seed}}.json",
@@ -85,8 +85,8 @@ rule boosted_trees:
     input:
         stores=every("voxels", "store"),
         manifests=every("voxels", "manifest"),
-        crop_stores=every("crops", "store"),
-        crops=every("crops", "manifest"),
+        crop_stores=every("crops", "store") if settings.score_towers else [],
+        crops=every("crops", "manifest") if settings.score_towers else [],
         split=f"{R}/split/split.csv",
     output:
         scores=expand(f"{R}/boosted_trees/seed-{{seed}}.json", seed=VALUES["seed"]),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -73,15 +73,17 @@ def project_root() -> Path:
     return ROOT
 
 
-@pytest.fixture(scope="session")
-def pictures() -> ModuleType:
-    """``tools/doc_pictures.py``, which opens pages in a browser; skips without Chromium."""
+@pytest.fixture(scope="module")
+def pictures() -> Iterator[ModuleType]:
+    """``tools/doc_pictures.py``, which opens pages in a browser, the same for the tests of a file;
+    skips without Chromium."""
     spec = importlib.util.spec_from_file_location("pictures", ROOT / "tools" / "doc_pictures.py")
     module = sys.modules[spec.name] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     if module.chromium() is None:
         pytest.skip("no Chromium here; on Debian and Ubuntu: apt install chromium")
-    return module
+    with module.one_browser():
+        yield module
 
 
 @pytest.fixture(scope="session")

@@ -24,7 +24,7 @@ from scenenet.tracking.ui import comparison, experiment_runs, metric_over_steps,
 if TYPE_CHECKING:
     from mlflow import MlflowClient
     from mlflow.entities import Run
-    from playwright.sync_api import Page
+    from playwright.sync_api import Browser, Page
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 WIDTH = 1200
@@ -52,6 +52,25 @@ def chromium() -> str | None:
     return next((found for name in names if (found := shutil.which(name))), None)
 
 
+_started: list[Browser] = []
+
+
+@contextlib.contextmanager
+def one_browser() -> Iterator[None]:
+    """Open all pages inside the block in one process of Chromium: to start it takes longer than
+    most pages."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        _started.append(
+            playwright.chromium.launch(executable_path=chromium(), args=["--disable-gpu"])
+        )
+        try:
+            yield
+        finally:
+            _started.pop().close()
+
+
 @contextlib.contextmanager
 def browsing(
     scheme: str = "light", width: int = WIDTH, height: int = 900, **stored: str
@@ -63,18 +82,15 @@ def browsing(
         width, height: of the window, px.
         stored: what else the browser remembers of its last visit, as in ``localStorage``.
     """
-    from playwright.sync_api import sync_playwright
-
     remembered = json.dumps(PREFERENCES | stored)
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium(), args=["--disable-gpu"])
-        context = browser.new_context(
+    with contextlib.nullcontext() if _started else one_browser():
+        context = _started[-1].new_context(
             color_scheme=scheme, viewport={"width": width, "height": height}
         )
         context.set_default_timeout(PATIENCE_MS)
         context.add_init_script(f"Object.assign(localStorage, {remembered})")
         yield context.new_page()
-        browser.close()
+        context.close()
 
 
 @dataclass(frozen=True)

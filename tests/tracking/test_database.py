@@ -16,17 +16,10 @@ from pathlib import Path
 import pytest
 
 from scenenet.core.errors import InputError
-from scenenet.tracking import (
-    RunGroup,
-    RunRecord,
-    TrackingSettings,
-    create_store,
-    log_runs,
-    store_id,
-)
 from scenenet.tracking.database import DatabaseLockedError, check_schema, reading
 from scenenet.tracking.registry import register_champions
-from scenenet.tracking.store import STORE_TAG, request_for
+from scenenet.tracking.run_log import RunGroup, RunRecord, log_runs
+from scenenet.tracking.store import STORE_TAG, TrackingSettings, create_store, request_for, store_id
 
 KILLS = 10
 CREATE = (
@@ -41,7 +34,7 @@ def with_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a store and its record, made in another process: MLflow keeps it open."""
     folder = tmp_path_factory.mktemp("store")
     code = (
-        "from scenenet.tracking import TrackingSettings, create_store;"
+        "from scenenet.tracking.store import TrackingSettings, create_store;"
         "create_store(TrackingSettings(uri='sqlite:///mlflow.db'), 'store.json')"
     )
     subprocess.run([sys.executable, "-c", code], cwd=folder, check=True)
@@ -251,7 +244,7 @@ def test_the_creation_is_requested_again_only_if_the_store_is_another(settings, 
     assert replaced not in (first, again)
     # In another process, as the next run of the workflow: MLflow keeps the first file open.
     code = (
-        "import sys; from scenenet.tracking import TrackingSettings, create_store;"
+        "import sys; from scenenet.tracking.store import TrackingSettings, create_store;"
         "create_store(TrackingSettings(uri=sys.argv[1]), sys.argv[2], request=sys.argv[3])"
     )
     command = [sys.executable, "-c", code, settings.uri, str(record), replaced]

@@ -27,19 +27,12 @@ from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
 from scenenet.models.model_file import read_model
 from scenenet.results.folder import BOOSTED_TREES, Results, parameter_columns
-from scenenet.tracking import (
-    RunGroup,
-    RunRecord,
-    TrackingSettings,
-    create_store,
-    experiment_of,
-    log_runs,
-    model_groups,
-    store_id,
-)
 from scenenet.tracking.database import create_database, exclusive
 from scenenet.tracking.logged_model import example
+from scenenet.tracking.model_runs import model_groups
 from scenenet.tracking.registry import register_champions
+from scenenet.tracking.run_log import RunGroup, RunRecord, log_runs
+from scenenet.tracking.store import TrackingSettings, create_store, experiment_of, store_id
 from scenenet.tracking.study_runs import note_of, study_groups
 
 
@@ -77,7 +70,7 @@ def runs(client: MlflowClient, view: int = ViewType.ACTIVE_ONLY) -> dict[str, li
 
 def create_in_a_process_of_its_own(folder: Path, record: str) -> subprocess.Popen:
     code = (
-        "import sys; from scenenet.tracking import TrackingSettings, create_store;"
+        "import sys; from scenenet.tracking.store import TrackingSettings, create_store;"
         "create_store(TrackingSettings(uri='sqlite:///mlflow.db'), sys.argv[1])"
     )
     command = [sys.executable, "-c", code, record]

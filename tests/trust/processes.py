@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -12,10 +13,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-LIMIT_S = 900.0
+from fixtures.forked import SCENENET, command_line
+
+LIMIT_S = 900
 """A command that takes longer counts as stuck, even on a busy machine."""
 POLL_S = 0.0005
-MAIN = "from scenenet.cli.app import main; main()"
 
 
 def environment(**more: str) -> dict[str, str]:
@@ -43,6 +45,9 @@ class Ended:
         return None
 
 
+STUCK = Ended(-1, "", f"it was stuck for {LIMIT_S} s")
+
+
 def predict(survey: Path, model: Path, out: Path) -> tuple[object, ...]:
     """Arguments that predict a survey of poles without conductors."""
     return ("predict", survey, "--model", model, "--out", out, "--min-conductor", 0)
@@ -56,19 +61,25 @@ def start(*arguments: object, tmp: Path | None = None, max_file: int | None = No
         tmp: directory for temporary files.
         max_file: limit on the size of a file that it may write, bytes.
     """
-    if tmp is not None:
-        tmp.mkdir(parents=True, exist_ok=True)
-    program = MAIN
+    program = SCENENET
     if max_file is not None:
         limit = f"import resource as r; r.setrlimit(r.RLIMIT_FSIZE, ({max_file},) * 2); "
-        program = limit + MAIN
+        program = limit + SCENENET
     return subprocess.Popen(
         [sys.executable, "-c", program, *map(str, arguments)],
-        env=environment(**({} if tmp is None else {"TMPDIR": str(tmp)})),
+        env=_in(tmp),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
+
+
+def _in(tmp: Path | None) -> dict[str, str]:
+    """The environment of a process with its own directory for temporary files, which is made."""
+    if tmp is None:
+        return environment()
+    tmp.mkdir(parents=True, exist_ok=True)
+    return environment(TMPDIR=str(tmp))
 
 
 def end_of(process: subprocess.Popen) -> Ended:
@@ -78,13 +89,18 @@ def end_of(process: subprocess.Popen) -> Ended:
     except subprocess.TimeoutExpired:
         process.kill()
         process.communicate()
-        return Ended(-1, "", f"it was stuck for {LIMIT_S:g} s")
+        return STUCK
     return Ended(process.returncode, out, err)
 
 
 def scenenet(*arguments: object, tmp: Path | None = None, max_file: int | None = None) -> Ended:
     """Run a command to its end."""
-    return end_of(start(*arguments, tmp=tmp, max_file=max_file))
+    if max_file is not None:  # a forked process writes its messages to files too
+        return end_of(start(*arguments, tmp=tmp, max_file=max_file))
+    done = command_line().call(SCENENET, [*map(str, arguments)], Path.cwd(), _in(tmp), LIMIT_S)
+    if done.returncode == -signal.SIGALRM:
+        return STUCK
+    return Ended(done.returncode, done.stdout, done.stderr)
 
 
 def must(*arguments: object, tmp: Path | None = None) -> Ended:

@@ -22,6 +22,7 @@ from pathlib import Path
 
 import laspy
 import numpy as np
+from fixtures.forked import SCENENET
 
 from scenenet.pointcloud.append_dimensions import REWRITTEN
 from scenenet.pointcloud.las.header import read_header
@@ -83,7 +84,7 @@ def look_at(files: Iterable[Path], model: Path) -> Iterator[Outcome]:
 
 
 def _run(file: Path, command: str, arguments: list[object], out: Path | None = None) -> Outcome:
-    call = [sys.executable, "-c", "from scenenet.cli.app import main; main()", command]
+    call = [sys.executable, "-c", SCENENET, command]
     start, used = time.perf_counter(), _cpu_seconds()
     try:
         done = subprocess.run(

@@ -14,6 +14,7 @@ import pytest
 import yaml
 from fixtures.project import PACKAGE, PARTS, Project, copy_parts
 
+DATASET = ("split", "voxels")
 TRAINING = ("train_scenenet", "train_cnn")
 
 
@@ -52,10 +53,11 @@ def finished(tmp_path_factory, project_root, recorded) -> Project:
             first = Project(folder, package=project_root, forked=True)
             copy_parts(project_root, folder, PARTS)
             _configure(first, recorded)
-            # As users run it up to the trained models, because trainings record their memory.
-            start = first.call("--until", *TRAINING)
-            assert start.returncode == 0, start.stdout
-            text = start.stdout + first.run()
+            text = first.run("--until", *DATASET)
+            # Trainings record their memory, so they run as users run them.
+            trained = first.call("--until", *TRAINING)
+            assert trained.returncode == 0, trained.stdout
+            text += trained.stdout + first.run()
             copy_parts(project_root, folder, [PACKAGE])
             shown.write_text(text, encoding="utf-8")
     return Project(folder, package=folder, shown=shown.read_text(encoding="utf-8"), forked=True)

@@ -4,7 +4,7 @@ import _job
 
 
 def mlflow_store(job: _job.Job) -> None:
-    from scenenet.tracking import TrackingSettings, create_store, experiment_of
+    from scenenet.tracking.store import TrackingSettings, create_store, experiment_of
 
     settings = TrackingSettings(**job.settings)
     names = [experiment_of(settings, study).experiment for study in job.identity["studies"]]

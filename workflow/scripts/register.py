@@ -5,8 +5,8 @@ from _results import results_of
 
 
 def register(job: _job.Job) -> None:
-    from scenenet.tracking import TrackingSettings
     from scenenet.tracking.registry import register_champions
+    from scenenet.tracking.store import TrackingSettings
 
     settings = TrackingSettings(**job.settings)
     dataset = job.identity["dataset"]

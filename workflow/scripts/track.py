@@ -11,7 +11,9 @@ NOTE = (
 
 def track(job: _job.Job) -> None:
     from scenenet.figures import read_pictures
-    from scenenet.tracking import TrackingSettings, log_runs, model_groups
+    from scenenet.tracking.model_runs import model_groups
+    from scenenet.tracking.run_log import log_runs
+    from scenenet.tracking.store import TrackingSettings
 
     results = results_of(job)
     groups = model_groups(

@@ -30,9 +30,10 @@ CREATION_LIMIT_S = 300
 
 
 @pytest.fixture(scope="module")
-def with_store(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def with_store(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a store and its record, made in another process: MLflow keeps it open."""
     folder = tmp_path_factory.mktemp("store")
+    shutil.copyfile(empty_database, folder / "mlflow.db")
     code = (
         "from scenenet.tracking.store import TrackingSettings, create_store;"
         "create_store(TrackingSettings(uri='sqlite:///mlflow.db'), 'store.json')"

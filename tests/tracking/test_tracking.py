@@ -27,23 +27,12 @@ from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
 from scenenet.models.model_file import read_model
 from scenenet.results.folder import BOOSTED_TREES, Results, parameter_columns
-from scenenet.tracking.database import create_database, exclusive
 from scenenet.tracking.logged_model import example
 from scenenet.tracking.model_runs import model_groups
 from scenenet.tracking.registry import register_champions
 from scenenet.tracking.run_log import RunGroup, RunRecord, log_runs
 from scenenet.tracking.store import TrackingSettings, create_store, experiment_of, store_id
 from scenenet.tracking.study_runs import note_of, study_groups
-
-
-@pytest.fixture(scope="session")
-def empty_database(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """MLflow's tables without our experiments; creating them takes seconds, so they are copied."""
-    folder = tmp_path_factory.mktemp("mlflow")
-    settings = TrackingSettings(uri=f"sqlite:///{folder / 'mlflow.db'}")
-    with exclusive(settings.uri):
-        create_database(settings.uri)
-    return folder / "mlflow.db"
 
 
 @pytest.fixture

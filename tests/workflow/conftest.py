@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
-import os
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -12,6 +10,7 @@ from typing import Any
 
 import pytest
 import yaml
+from fixtures.made_once import made_once
 from fixtures.project import PACKAGE, PARTS, Project, copy_parts
 
 DATASET = ("split", "voxels")
@@ -37,30 +36,26 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory, project_root, recorded) -> Project:
     """The workflow after its first run: two synthetic surveys to train on and a recorded one that
-    is only classified. Not to be changed; take ``project`` for that.
+    is only classified. Not to be changed; take ``project`` for that."""
 
-    All workers of a test run share it: the first one runs it, the others wait.
-    """
-    shared = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        shared = shared.parent
-    folder, shown = shared / "finished" / "project", shared / "finished" / "shown.txt"
-    with (shared / "finished.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not shown.exists():
-            # It uses the package of the repository, which may be compiled already. The tests change
-            # a copy. Nothing runs again because of the copy: digests are those of the content.
-            first = Project(folder, package=project_root, forked=True)
-            copy_parts(project_root, folder, PARTS)
-            _configure(first, recorded)
-            text = first.run("--until", *DATASET)
-            # Trainings record their memory, so they run as users run them.
-            trained = first.call("--until", *TRAINING)
-            assert trained.returncode == 0, trained.stdout
-            text += trained.stdout + first.run()
-            copy_parts(project_root, folder, [PACKAGE])
-            shown.write_text(text, encoding="utf-8")
-    return Project(folder, package=folder, shown=shown.read_text(encoding="utf-8"), forked=True)
+    def make(shared: Path) -> None:
+        # It uses the package of the repository, which may be compiled already. The tests change
+        # a copy. Nothing runs again because of the copy: digests are those of the content.
+        folder = shared / "project"
+        first = Project(folder, package=project_root, forked=True)
+        copy_parts(project_root, folder, PARTS)
+        _configure(first, recorded)
+        text = first.run("--until", *DATASET)
+        # Trainings record their memory, so they run as users run them.
+        trained = first.call("--until", *TRAINING)
+        assert trained.returncode == 0, trained.stdout
+        text += trained.stdout + first.run()
+        copy_parts(project_root, folder, [PACKAGE])
+        (shared / "shown.txt").write_text(text, encoding="utf-8")
+
+    shared = made_once(tmp_path_factory, "finished", make)
+    folder, shown = shared / "project", (shared / "shown.txt").read_text(encoding="utf-8")
+    return Project(folder, package=folder, shown=shown, forked=True)
 
 
 def _configure(project: Project, recorded: Path) -> None:

@@ -34,11 +34,11 @@ def fill_volume(runs, table, kx, bias, activated, out):  # pragma: no cover - co
                 begin = (y + above) * length + left
                 row = buffer[begin : begin + width]
                 if not activated:
-                    plane[y] = row
+                    copy_row(row, plane[y])
                 elif reached[y]:
                     activate_row(row, bias, plane[y])
                 else:
-                    plane[y] = activate(bias)
+                    fill_row(activate(bias), plane[y])
 
 
 @numba.njit(**COMPILED)
@@ -46,3 +46,18 @@ def activate_row(responses, bias, out):  # pragma: no cover - compiled
     """out = (tanh(responses + bias))_+, for as many numbers as ``out`` has."""
     for x in range(len(out)):
         out[x] = activate(responses[x] + bias)
+
+
+# Loops, because numba compiles a check of shapes, with its message, into each assignment to a row.
+
+
+@numba.njit(**COMPILED)
+def copy_row(values, out):  # pragma: no cover - compiled
+    for x in range(len(out)):
+        out[x] = values[x]
+
+
+@numba.njit(**COMPILED)
+def fill_row(value, out):  # pragma: no cover - compiled
+    for x in range(len(out)):
+        out[x] = value

@@ -18,7 +18,6 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))  # document this checkout, whichever version is installed
 
 SETTINGS, CLI, API = "reference/settings.md", "reference/cli.md", "reference/api"
-GENERATED = (SETTINGS, CLI)
 """Pages that stand in the navigation of ``mkdocs.yml`` and not in ``docs/``."""
 
 

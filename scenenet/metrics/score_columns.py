@@ -96,7 +96,6 @@ class ScoreColumn:
         description: what the score is, as a phrase.
         compute: the score of the counts of all voxels of all samples; None if it is not defined.
         unit: ``1`` for a share between 0 and 1.
-        higher_is_better: direction.
         tower_only: whether the score depends on the tower class alone. Tables that compare two
             ways to count leave the others out, because background fills nearly all voxels.
         published: whether the thesis reports it for its models and ablations (Table 5.3).
@@ -108,7 +107,6 @@ class ScoreColumn:
     description: str
     compute: Callable[[Counts], float | None]
     unit: str = "1"
-    higher_is_better: bool = True
     tower_only: bool = True
     published: bool = False
 

@@ -232,11 +232,6 @@ class Results:
         path = self.folder / experiment / "times.csv"
         return read_table(path) if path.exists() else None
 
-    def champion_file(self, model: str) -> Path | None:
-        """The model that predicts (``models/MODEL.json``, or only ``.safetensors``)."""
-        files = self._files("models", ".", model)
-        return files[0] if files else None
-
     def checks(self) -> dict[str, SurveyReport]:
         """The check report of each survey, including those that are only classified."""
         surveys = dict.fromkeys([*self.surveys, *self.predicted])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from fixtures.scenes import model_card
 
 from scenenet.interpretability.certificate import certificate
 from scenenet.interpretability.geneo_properties import certify
@@ -17,16 +18,7 @@ from scenenet.models.settings import MetricSettings
 
 @pytest.fixture(scope="module")
 def card() -> ModelCard:
-    return ModelCard(
-        name="m",
-        codes="edp",
-        measurement="presence",
-        fit="metric",
-        resolution=64,
-        voxel_size=1.0,
-        tau=0.7,
-        provenance={"seed": 4},
-    )
+    return model_card(provenance={"seed": 4})
 
 
 @pytest.fixture(scope="module")

@@ -9,26 +9,18 @@ from pathlib import Path
 
 import pytest
 import torch
+from fixtures.scenes import model_card
 from safetensors import safe_open
 
 from scenenet.core.errors import InputError
 from scenenet.models.cnn import CNN
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.model_file import ModelCard, read_model, suffix, write_model
+from scenenet.models.model_file import read_model, suffix, write_model
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import LARGEST_KERNEL, MetricSettings
 from scenenet.prediction.tiling import EDGE
 
-CARD = ModelCard(
-    name="m",
-    codes="edp",
-    measurement="presence",
-    fit="cube",
-    resolution=64,
-    voxel_size=0.9,
-    tau=0.25,
-    provenance={"seed": 3, "config": "abc"},
-)
+CARD = model_card(fit="cube", voxel_size=0.9, tau=0.25, provenance={"seed": 3, "config": "abc"})
 
 
 @pytest.fixture

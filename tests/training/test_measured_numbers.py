@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from fixtures.scenes import model_card
 
 from scenenet.cli.inputs import Failures
 from scenenet.cli.labelled_files import read_labelled
@@ -16,7 +17,7 @@ from scenenet.dataset.tower_shapes import TowerShape
 from scenenet.dataset.voxels import VoxelGrid, VoxelSettings, voxelise
 from scenenet.models.evidence import Evidence
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.model_file import ModelCard, read_model, write_model
+from scenenet.models.model_file import read_model, write_model
 from scenenet.models.settings import MetricSettings, ModelSettings, SearchSettings
 from scenenet.synthetic import SyntheticSettings, make_survey
 from scenenet.training.determination import evidence
@@ -25,15 +26,7 @@ from scenenet.training.train import fit
 
 LENGTHS = MetricSettings(radius=2.0, above=3.0, below=3.0)
 SHAPE = TowerShape(half_width=0.4, spread=0.1, reach=1.2, reach_spread=0.9)
-CARD = ModelCard(
-    name="m",
-    codes="edp",
-    measurement="presence",
-    fit="cube",
-    resolution=64,
-    voxel_size=0.9,
-    tau=0.5,
-)
+CARD = model_card(fit="cube", voxel_size=0.9, tau=0.5)
 MEASURED = {
     "cylinder.r": 0.4, "cylinder.sigma": 0.1, "arrow.r": 0.4, "arrow.sigma": 0.9, "arrow.r_c": 1.2,
 }  # fmt: skip

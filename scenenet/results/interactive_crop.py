@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -75,7 +75,7 @@ class InteractiveCrop:
         for name in ("classes", "taus", "true", "false"):
             values[name] = list(values[name])
         values["shares"] = {name: _coded(row, SHARES) for name, row in self.shares.items()}
-        values["whole_scores"] = vars(self.whole_scores)
+        values["whole_scores"] = asdict(self.whole_scores)
         return values
 
     @classmethod

@@ -37,7 +37,9 @@ def serving(uri: str) -> Iterator[str]:
     address = f"http://{HOST}:{port}"
     command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri,
                "--host", HOST, "--port", str(port), "--workers", "1"]  # fmt: skip
-    environment = {**os.environ, "MLFLOW_DISABLE_TELEMETRY": "true"}
+    # Without its runners of jobs, eight processes that only generative models need.
+    without = {"MLFLOW_DISABLE_TELEMETRY": "true", "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false"}
+    environment = {**os.environ, **without}
     with tempfile.TemporaryFile() as log:
         # In its own session, because it starts processes that must be stopped with it.
         process = subprocess.Popen(

@@ -62,7 +62,8 @@ def test_radius_and_reach_of_a_model_follow_those_of_the_towers(tmp_path, width,
         towers=4, seed=12, body_width=width, arm_reach=reach, kinds=kinds, density=30.0, section=0
     )
     make_survey(line, tmp_path / "line.laz", workers=1)
-    dataset = read_labelled([tmp_path / "line.laz"], "edp", VoxelSettings(), Failures()).dataset
+    files = read_labelled([tmp_path / "line.laz"], "edp", VoxelSettings(), Failures(), tmp_path)
+    dataset = files.dataset
     found = measure(net(), dataset.samples)
     assert found["cylinder.r"].value == pytest.approx(width / 2, rel=0.3)
     assert found["arrow.r_c"].value == pytest.approx(reach, rel=0.3)

@@ -186,11 +186,7 @@ class Config(Settings):
         ):
             if twice := [str(name) for name, count in Counter(names).items() if count > 1]:
                 raise ValueError(f"{what}: {', '.join(twice)} is listed more than once")
-        whole = [
-            model.name
-            for model in self.models
-            if model.protocol == "operational" and model.metric.whole_towers
-        ]
+        whole = [model.name for model in self.models if model.gives_whole_towers]
         if whole and not self.score_towers:
             raise ValueError(
                 f"score_towers: {', '.join(whole)} gives whole towers, so they have to be scored; "

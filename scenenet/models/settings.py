@@ -212,6 +212,11 @@ class ModelSettings(Settings):
     measurement: Measurement = Field("presence", description="phi (thesis 4.2.2, 5.3.2)")
     training: TrainingSettings = TrainingSettings()
 
+    @property
+    def gives_whole_towers(self) -> bool:
+        """Whether its answer is whole towers instead of the voxels at or above tau."""
+        return self.protocol == "operational" and self.metric.whole_towers
+
     @model_validator(mode="before")
     @classmethod
     def _old_names(cls, raw: Any) -> Any:

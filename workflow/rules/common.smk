@@ -117,8 +117,22 @@ def study_settings(name):
     return settings.study_named(name).model_dump(mode="json")
 
 
+def made_for_crops(file):
+    """A file of a synthetic survey, which is large and may be of no use after its crops are cut."""
+    return temp(file) if settings.synthetic.temporary else file
+
+
 def models_of(kind):
     return [model.name for model in settings.models if model.kind == kind]
+
+
+def tuning_of(model):
+    """The settings of the tuning. The rules of detection matter where whole towers are scored."""
+    whole = settings.model_named(model).gives_whole_towers
+    return {
+        "tuning": SETTINGS["tuning"],
+        "detection": SETTINGS["detection"] if whole else None,
+    }
 
 
 def suffix_of(model):

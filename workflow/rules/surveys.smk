@@ -1,11 +1,6 @@
 """Surveys: making synthetic ones, and checking all."""
 
 
-def made_for_crops(file):
-    """A file of a synthetic survey, which is large and may be of no use after its crops are cut."""
-    return temp(file) if settings.synthetic.temporary else file
-
-
 rule synthesize:
     output:
         survey=made_for_crops(f"{R}/synthetic/{{synthetic}}.laz"),

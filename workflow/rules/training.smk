@@ -69,7 +69,7 @@ for kind, suffix in MODEL_SUFFIXES.items():
             mem_mb=3000,
             runtime=60,
         params:
-            job=job("tune", {name: SETTINGS[name] for name in ("tuning", "detection")}),
+            job=lambda w: job("tune", tuning_of(w.model)),
         message:
             "Choosing the threshold of {wildcards.model}, seed {wildcards.seed}"
         script:

@@ -14,7 +14,7 @@ def tune(job: _job.Job) -> None:
         job.input.crops,
         job.input.split,
         TuningSettings(**job.settings["tuning"]),
-        DetectionSettings(**job.settings["detection"]),
+        DetectionSettings(**(job.settings["detection"] or {})),
         job.output.model,
         job.output.tuning,
     )

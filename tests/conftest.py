@@ -18,7 +18,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:
 import hypothesis
 import numpy as np
 import pytest
-from fixtures.scenes import PLACE, make_pole_finder, make_scene
+from fixtures.scenes import PLACE, conductor_places, make_pole_finder, make_scene
 
 from scenenet.pointcloud import PointCloud
 
@@ -154,15 +154,7 @@ class Lattice:
         beside: tuple[float, ...] = (-1.5, 0.0, 1.5),
     ) -> np.ndarray:
         """Conductors from (x, y) towards a bearing in degrees, falling by 1 m on the way."""
-        s = np.arange(0, end, 0.25)
-        east, north = np.sin(np.radians(bearing)), np.cos(np.radians(bearing))
-        lines = [
-            np.column_stack(
-                [x + s * east + t * north, y + s * north - t * east, height - s / max(end, 1)]
-            )
-            for t in beside
-        ]
-        return cls.voxels(np.concatenate(lines))
+        return cls.voxels(conductor_places(bearing, height, x, y, end, beside))
 
     @staticmethod
     def together(*parts: np.ndarray) -> np.ndarray:

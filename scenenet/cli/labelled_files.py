@@ -43,6 +43,7 @@ from scenenet.pointcloud.reading import same_points
 from scenenet.pointcloud.ts40k import sample_files
 from scenenet.training.train import card_of, fit
 from scenenet.training.tuning import choose
+from scenenet.training.tuning_result import Tuning
 
 
 @dataclass(frozen=True)
@@ -255,19 +256,21 @@ def train_files(
         "tuned_on": "validation" if kept else "training",
         "scores": asdict(result.validation),
         "whole_towers": _plain(result.whole_towers),
-        "seeds": [
-            {
-                "seed": s,
-                "kernel_size": list(r.kernel_size),
-                **asdict(r.validation),
-                "whole_towers": _plain(r.whole_towers),
-            }
-            for s, _, _, r in candidates
-        ],
+        "seeds": [_of_seed(number, found) for number, _, _, found in candidates],
         "numbers": _numbers(tuned, [candidate for _, candidate, _, _ in candidates]),
         "crops": {"training": len(training), "validation": len(kept)},
         "skipped": files.skipped,
         "warnings": files.warnings,
+    }
+
+
+def _of_seed(seed: int, found: Tuning) -> dict[str, Any]:
+    """What the tuning found for one seed."""
+    return {
+        "seed": seed,
+        "kernel_size": list(found.kernel_size),
+        **asdict(found.validation),
+        "whole_towers": _plain(found.whole_towers),
     }
 
 

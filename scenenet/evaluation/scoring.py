@@ -5,7 +5,7 @@ The scores are defined in docs/development/architecture.md.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -33,6 +33,7 @@ from scenenet.metrics.voxel_scores import Confusion, VoxelScores, confusion
 from scenenet.models.base import VoxelModel
 from scenenet.models.model_file import ModelCard, read_model
 from scenenet.models.predictions import probabilities
+from scenenet.pointcloud import PointCloud
 
 
 def evaluate(
@@ -60,13 +61,7 @@ def evaluate(
         raise InputError(f"{card.name} gives whole towers, which need the crops", file=model)
     answer: Answering = no_answer
     if crop_manifests:
-        answer = rules_on(
-            CropClouds(crop_manifests),
-            predictor(trained, card),
-            card.threshold(),
-            trained.observed_size(card.voxel_size),
-            detection,
-        )
+        answer = answer_of(trained, card, CropClouds(crop_manifests), detection)
     dataset = load(voxel_manifests, crops_in(split, part))
     return replace(score(trained, card, dataset, answer), part=part)
 
@@ -74,6 +69,18 @@ def evaluate(
 def predictor(model: VoxelModel, card: ModelCard) -> Predict:
     """The probabilities of a model."""
     return lambda sample: probabilities(model, sample, card.measurement)
+
+
+def answer_of(
+    model: VoxelModel,
+    card: ModelCard,
+    clouds: Mapping[str, PointCloud],
+    detection: DetectionSettings,
+) -> Callable[[VoxelSample], Answer]:
+    """The whole towers that a tuned model finds in each crop whose points are in ``clouds`` by its
+    id."""
+    size = model.observed_size(card.voxel_size)
+    return rules_on(clouds, predictor(model, card), card.threshold(), size, detection)
 
 
 def score(

@@ -16,8 +16,7 @@ from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import load
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.answers import rules_on
-from scenenet.evaluation.scoring import predictor
+from scenenet.evaluation.scoring import answer_of
 from scenenet.metrics.voxel_scores import Confusion, VoxelScores
 from scenenet.models.base import VoxelModel
 from scenenet.models.model_file import ModelCard, read_model, write_model
@@ -71,8 +70,7 @@ def with_answer(
     """
     if not model.whole_towers:
         return tuning
-    size = model.observed_size(card.voxel_size)
-    answer = rules_on(clouds, predictor(model, card), tuning.tau, size, detection)
+    answer = answer_of(model, card, clouds, detection)
     counts = Confusion()
     for sample in samples:
         labelled = sample.labels()

@@ -59,8 +59,7 @@ def write_interactive_crop(
     """
     from scenenet.dataset.voxels import VoxelSettings, voxelise
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.evaluation.answers import with_rules
-    from scenenet.evaluation.scoring import predictor
+    from scenenet.evaluation.scoring import answer_of
     from scenenet.figures.selection import champion_of, crop_cloud, ranked, voxel_classes
     from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
     from scenenet.models.model_file import read_model
@@ -74,10 +73,9 @@ def write_interactive_crop(
     voxels = voxelise(cloud, settings.grid(cloud.xyz), sample.id)
     names = voxel_classes(cloud.roles, voxels.grid.voxel_of(cloud.xyz), voxels.index)
     probability, truth = probabilities(trained, voxels, card.measurement)
-    tau, size = card.threshold(), trained.observed_size(card.voxel_size)
-    rules = detection or DetectionSettings()
-    answer = with_rules(cloud, voxels, predictor(trained, card), tau, size, rules)
-    whole = answer.among(len(truth))
+    tau = card.threshold()
+    answer = answer_of(trained, card, {sample.id: cloud}, detection or DetectionSettings())
+    whole = answer(voxels).among(len(truth))
     curve = ThresholdCurve.of(probability, truth)
     taus = THRESHOLDS.astype(probability.dtype)
     made = InteractiveCrop(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from fixtures.scenes import PLACE
+from fixtures.scenes import PLACE, conductor_places
 
 from scenenet.synthetic.scene.towers import KINDS, place, sample
 
@@ -116,16 +116,7 @@ class Points:
         beside: tuple[float, ...] = (-1.5, 0.0, 1.5),
     ) -> np.ndarray:
         """Conductors from the voxel at (x, y) towards a bearing in degrees, falling by 1 m."""
-        s = np.arange(0, end, 0.25)
-        east, north = np.sin(np.radians(bearing)), np.cos(np.radians(bearing))
-        x, y = x + 0.5, y + 0.5
-        lines = [
-            np.column_stack(
-                [x + s * east + t * north, y + s * north - t * east, height - s / max(end, 1)]
-            )
-            for t in beside
-        ]
-        return cls.at(np.concatenate(lines))
+        return cls.at(conductor_places(bearing, height, x + 0.5, y + 0.5, end, beside))
 
     @classmethod
     def tree(cls, x: float, y: float, height: float, seed: int = 0) -> np.ndarray:

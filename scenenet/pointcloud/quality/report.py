@@ -41,8 +41,8 @@ class SurveyFacts:
         extra_dimensions: names of the dimensions beyond those of the point format.
         duplicated_points: number of points at the coordinates of another point.
         duplicates_estimated: whether that number is estimated from a sample of the places.
-        stray_points, points_outside_header_box, points_without_gps_time, withheld_points,
-            impossible_returns: number of such points.
+        stray_points, points_outside_header_box, points_without_gps_time: number of such points.
+        withheld_points, impossible_returns: number of such points.
         samples: number of files of a folder; None for a file.
     """
 

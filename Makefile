@@ -6,13 +6,16 @@ CORES ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
-.PHONY: reproduce test trust package docs bench pictures lint clean help
+.PHONY: reproduce test claims trust package docs bench pictures lint clean help
 
 reproduce: $(INSTALLED)  ## all results of the default configuration, under results/
 	$(VENV)/bin/snakemake --cores $(CORES)
 
 test: $(INSTALLED)  ## the tests
 	$(VENV)/bin/python -m pytest -n $(CORES) --no-loadscope-reorder
+
+claims: $(INSTALLED)  ## compare every figure in README and docs with the results of its run
+	$(VENV)/bin/python tools/doc_figures.py
 
 trust: $(INSTALLED)  ## try to lose something: damaged files, kills, full disks; a table of what was lost
 	PYTHONPATH=tests $(VENV)/bin/python -m trust

@@ -1,7 +1,7 @@
 """Write the tables in the documentation that follow from the code: ``python tools/doc_tables.py``.
 
 A table stands in a page between ``<!-- NAME -->`` and ``<!-- end -->``; a test compares it with the
-code.
+code. ``tools/doc_figures.py`` writes the tables of measured figures in the same way.
 """
 
 from __future__ import annotations
@@ -48,11 +48,12 @@ def tables_in(text: str) -> dict[str, str]:
     return dict(re.findall(r"<!-- (?!end)([a-z ]+) -->\n(.*?)\n<!-- end -->", text, re.DOTALL))
 
 
-def with_tables(text: str) -> str:
-    """A page with its tables as the code has them."""
+def with_tables(text: str, tables: Mapping[str, Callable[[], str]] = TABLES) -> str:
+    """A page with those of its tables that are in ``tables`` made again."""
     for name, old in tables_in(text).items():
-        start = f"<!-- {name} -->\n"
-        text = text.replace(f"{start}{old}", f"{start}{TABLES[name]()}")
+        if name in tables:
+            start = f"<!-- {name} -->\n"
+            text = text.replace(f"{start}{old}", f"{start}{tables[name]()}")
     return text
 
 

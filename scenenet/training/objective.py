@@ -2,7 +2,7 @@
 
 The gradient of the thesis' loss is zero where the observer is negative (ReLU), which is why some
 models start dead. Eleven numbers can be found without a gradient: sets of numbers are drawn, scored
-on the training crops, and drawn again around the better ones (docs/method/accuracy.md). The search
+on the training crops, and drawn again around the better ones (docs/method/decisions.md). The search
 starts at the best of many draws over the whole ranges. It therefore starts dead only if every draw
 does.
 """

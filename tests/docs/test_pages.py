@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import doc_tables
 import pytest
 import typer
 import yaml
+from figure_tables import tables_of
+from kept_runs import Values, read_figures
 
 from scenenet.cli.app import app
 from scenenet.config.schema import Config
@@ -66,15 +68,12 @@ def test_every_setting_in_an_example_is_one_of_the_configuration(project_root: P
 
 
 def test_the_tables_in_the_pages_are_those_of_the_code(project_root: Path):
-    path = project_root / "tools" / "doc_tables.py"
-    spec = importlib.util.spec_from_file_location("doc_tables", path)
-    tables = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(tables)
     shown = {}
     for page in _pages(project_root):
-        shown |= tables.tables_in(page.read_text())
-    assert shown.keys() == tables.TABLES.keys()
-    stale = [name for name, make in tables.TABLES.items() if shown[name] != make()]
+        shown |= doc_tables.tables_in(page.read_text())
+    measured = tables_of(Values(project_root), read_figures(project_root))
+    assert shown.keys() == doc_tables.TABLES.keys() | measured.keys()
+    stale = [name for name, make in doc_tables.TABLES.items() if shown[name] != make()]
     assert not stale, "run: python tools/doc_tables.py"
 
 

@@ -1,7 +1,7 @@
 """Cross-validation: every crop is a test crop once, because one split of a few crops says little.
 
 tau is chosen on the training crops of the fold; nothing is chosen on the crops left out
-(docs/method/accuracy.md).
+(docs/method/baselines.md).
 """
 
 from __future__ import annotations

@@ -1,0 +1,144 @@
+"""The tables of figures in README and docs, from the results of the kept runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, NamedTuple
+
+import pandas as pd
+from kept_runs import FIGURES, Figures, Values, days_of
+
+from scenenet.core.errors import InputError
+from scenenet.experiments.components.settings import PUBLISHED, WITH, WITHOUT
+from scenenet.experiments.components.summary import COUNTED
+from scenenet.metrics.score_columns import TRUTH
+
+Row = Mapping[str, Any]
+
+
+class Table(NamedTuple):
+    """A table of figures.
+
+    Attributes:
+        runs: those that it shows.
+        make: its text.
+    """
+
+    runs: tuple[str, ...]
+    make: Callable[[], str]
+
+
+def accuracy_table(values: Values, figures: Figures, run: str, against: str) -> str:
+    """Every source of a run of the experiment `components`, on points, voxels and towers."""
+    head = "source | rules | points: P, R | F0.5 | IoU | voxels: P, R | F0.5 | IoU"
+    lines = [f"| {head} | towers found / false |", "|---" * 9 + "|"]
+    for row in sorted(values.rows(run, "components"), key=partial(_order, figures)):
+        if pd.notna(row[f"{against}point_f05"]):
+            cells = _case(figures, row)
+            for what in COUNTED:
+                column = f"{against}{what}_"
+                cells += [_p_r(row, column), _f05(row, column), f"{row[f'{column}iou_tower']:.2f}"]
+            lines.append(f"| {' | '.join([*cells, _towers(row, against)])} |")
+    return "\n".join([*lines, "", _of_run(values, figures, run)])
+
+
+def short_table(values: Values, figures: Figures, runs: Mapping[str, str]) -> str:
+    """Points and towers of several runs beside each other.
+
+    Args:
+        values: of the kept runs.
+        figures: ``docs/figures.yaml``.
+        runs: name -> beginning of the columns to show.
+    """
+    head = "| source | rules |"
+    cases: dict[tuple[int, bool], dict[str, Row]] = {}
+    for run, against in runs.items():
+        rows = values.rows(run, "components")
+        there = max(row[f"{against}towers"] for row in rows if row["rules"] == WITH)
+        title = figures.runs[run].title
+        head += f" {title}: points P, R | F0.5 | found / false of {there:.0f} |"
+        for row in sorted(rows, key=partial(_order, figures)):
+            if pd.notna(row[f"{against}point_f05"]):
+                cases.setdefault(_order(figures, row), {})[run] = row
+    lines = [head, "|---" * (2 + 3 * len(runs)) + "|"]
+    for _, of_runs in sorted(cases.items()):
+        cells = _case(figures, next(iter(of_runs.values())))
+        for run, against in runs.items():
+            if run not in of_runs:
+                cells += ["", "", ""]
+                continue
+            measured, column = of_runs[run], f"{against}point_"
+            cells += [_p_r(measured, column), _f05(measured, column), _towers(measured, against)]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join([*lines, "", " ".join(_of_run(values, figures, run) for run in runs)])
+
+
+def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
+    """Name in a page -> table of figures."""
+
+    def of_one(run: str, against: str) -> Table:
+        return Table((run,), partial(accuracy_table, values, figures, run, against))
+
+    both = {"synthetic": TRUTH, "ts40k": ""}
+    return {
+        "figures of both": Table(tuple(both), partial(short_table, values, figures, both)),
+        "figures of synthetic crops against the truth": of_one("synthetic", TRUTH),
+        "figures of synthetic crops against the labels": of_one("synthetic", ""),
+        "figures of the six crops": of_one("ts40k", ""),
+    }
+
+
+def _order(figures: Figures, row: Row) -> tuple[int, bool]:
+    """Place of a row in a table: as in ``sources``, without rules first."""
+    sources = list(figures.sources)
+    if row["model"] not in sources:
+        raise InputError(f"{row['model']!r} has no name", file=FIGURES, place="sources")
+    return sources.index(row["model"]), row["rules"] == WITH
+
+
+def _case(figures: Figures, row: Row) -> list[str]:
+    """The first cells of a row of a table."""
+    return [figures.sources[row["model"]], {WITH: "yes", WITHOUT: "no"}.get(row["rules"], "")]
+
+
+def _of_run(values: Values, figures: Figures, run: str) -> str:
+    """When a run was made, with how many seeds, and which sources it lacks."""
+    rows = values.rows(run, "components")
+    seeds = {
+        row["model"]: row["n_seeds"]
+        for row in rows
+        if row["parameters"] > 0 and row["model"] != PUBLISHED
+    }
+    title, days = figures.runs[run].title, " to ".join(days_of(values.root, run))
+    most = max(seeds.values())
+    fewer = [f"{figures.sources[model]}: {n}" for model, n in seeds.items() if n < most]
+    measured = {row["model"] for row in rows}
+    missing = [name for model, name in figures.sources.items() if model not in measured]
+    text = f"{title[0].upper()}{title[1:]}: measured {days} with {most} seeds"
+    text += f" ({'; '.join(fewer)})" if fewer else ""
+    return text + (f"; without {'; '.join(missing)}." if missing else ".")
+
+
+def _p_r(row: Row, column: str) -> str:
+    return f"{row[f'{column}precision']:.2f}, {row[f'{column}recall']:.2f}"
+
+
+def _f05(row: Row, column: str) -> str:
+    mean, worst = row[f"{column}f05"], row[f"{column}f05_worst"]
+    return f"{mean:.2f}" + (f", {worst:.2f}" if row["n_seeds"] > 1 else "")
+
+
+def _towers(row: Row, against: str) -> str:
+    if pd.isna(row[f"{against}towers_found"]):
+        return ""
+    mean, worst = (
+        " / ".join(tidy(row[f"{against}towers_{what}{end}"]) for what in ("found", "false"))
+        for end in ("", "_worst")
+    )
+    return f"{mean} ({worst})" if row["n_seeds"] > 1 else mean
+
+
+def tidy(number: float) -> str:
+    """A number with a decimal where it is not zero."""
+    return f"{number:.1f}".removesuffix(".0")

@@ -26,6 +26,7 @@ from kept_runs import (
     Values,
     keep,
     keeping,
+    kept_command,
     outlived,
     read_figures,
 )
@@ -38,6 +39,10 @@ MEASURED = re.compile(
     r"(?<![\w.])(?:\d+\.\d+|\d[\d ]*(?= ?%| (?:ms|s|seconds?|minutes?|hours?|[kKMGT]i?B)\b))"
 )
 """A number that may be a measurement: with a decimal point, a percentage, a time or a size."""
+
+
+NOT_CHECKED = "`make claims` does not check"
+"""What a page says of its figures if it is not covered."""
 
 
 class Fault(NamedTuple):
@@ -127,15 +132,31 @@ def check(root: Path, results: bool = True) -> list[Fault]:
     for page in covered(root, figures):
         text = (root / page).read_text(encoding="utf-8")
         faults += sorted(_page_faults(page, text, figures, values, tables), key=lambda f: f.line)
+    faults += _other_pages(root, figures)
+    for name, run in figures.runs.items():
+        quoting = list(_quoting(root, figures, tables, name))
+        if not any(run.command in (root / page).read_text(encoding="utf-8") for page in quoting):
+            faults.append(Fault(FIGURES, 1, f"no page that quotes {name} shows {run.command!r}"))
+        if kept_command(root, name) != run.command:
+            faults.append(
+                Fault(FIGURES, 1, f"{name} was kept from another command: run and keep it")
+            )
+        for file in outlived(root, run, name) if results else ():
+            problem = f"has outlived its run: {run.results} differs. It is quoted in"
+            remedy = f"Keep the last run: {keeping(name)} --write"
+            faults.append(Fault(file, 1, f"{problem} {', '.join(quoting)}. {remedy}"))
+    return faults
+
+
+def _other_pages(root: Path, figures: Figures) -> Iterator[Fault]:
+    """Pages that ``docs/figures.yaml`` names and that are not there, or not covered in silence."""
     for page in [*figures.sentences, *figures.no_measurement, *figures.not_covered]:
         if not (root / page).is_file():
-            faults.append(Fault(FIGURES, 1, f"there is no page {page}; remove it here"))
-    for name, run in figures.runs.items() if results else ():
-        for file in outlived(root, run, name):
-            pages = ", ".join(_quoting(root, figures, tables, name))
-            problem = f"has outlived its run: {run.results} differs. It is quoted in {pages}"
-            faults.append(Fault(file, 1, f"{problem}. Keep the last run: {keeping(name)} --write"))
-    return faults
+            yield Fault(FIGURES, 1, f"there is no page {page}; remove it here")
+        elif page in figures.not_covered:
+            text = (root / page).read_text(encoding="utf-8")
+            if not re.search(phrase(NOT_CHECKED), text):
+                yield Fault(page, 1, f"must say {NOT_CHECKED!r}, because it is not covered")
 
 
 def _quoting(root: Path, figures: Figures, tables: Mapping[str, Table], run: str) -> Iterator[str]:
@@ -241,15 +262,23 @@ def _commands(figures: Figures, runs: Iterable[str]) -> str:
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--write", action="store_true", help="correct tables and sentences")
-    parser.add_argument("--keep", metavar="RUN", help="copy the files of a run to docs/results")
-    parser.add_argument("--results", type=Path, help="folder of the run, if not its own")
+    parser.add_argument(
+        "--keep",
+        metavar="RUN",
+        nargs="+",
+        default=(),
+        help="copy the files of runs to docs/results",
+    )
+    parser.add_argument("--results", type=Path, help="folder of these runs, if not their own")
     options = parser.parse_args()
     try:
         figures, values = read_figures(ROOT), Values(ROOT)
-        if options.keep:
-            run = figures.runs[options.keep]
-            files = keep(ROOT, options.keep, run, options.results or ROOT / run.results)
-            print(f"{KEPT}/{options.keep}: {', '.join(files)}")
+        for name in options.keep:
+            if name not in figures.runs:
+                raise InputError(f"no run {name!r}: {', '.join(figures.runs)}", file=FIGURES)
+            run = figures.runs[name]
+            files = keep(ROOT, name, run, options.results or ROOT / run.results)
+            print(f"{KEPT}/{name}: {', '.join(files)}")
         for page in covered(ROOT, figures) if options.write else ():
             text = (ROOT / page).read_text(encoding="utf-8")
             write_text(ROOT / page, corrected(page, text, figures, values))

@@ -74,11 +74,19 @@ def short_table(values: Values, figures: Figures, runs: Mapping[str, str]) -> st
     return "\n".join([*lines, "", " ".join(_of_run(values, figures, run) for run in runs)])
 
 
+def printed_table(values: Values, run: str, file: str, number: int) -> str:
+    """One of the tables that a command printed, the first is 0."""
+    return values.text(run, file).strip().split("\n\n")[number]
+
+
 def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
     """Name in a page -> table of figures."""
 
     def of_one(run: str, against: str) -> Table:
         return Table((run,), partial(accuracy_table, values, figures, run, against))
+
+    def printed(run: str, file: str, number: int) -> Table:
+        return Table((run,), partial(printed_table, values, run, file, number))
 
     both = {"synthetic": TRUTH, "ts40k": ""}
     return {
@@ -86,6 +94,9 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of synthetic crops against the truth": of_one("synthetic", TRUTH),
         "figures of synthetic crops against the labels": of_one("synthetic", ""),
         "figures of the six crops": of_one("ts40k", ""),
+        "figures of synthetic and real crops": printed("domain_gap", "crops.txt", 0),
+        "figures of what separates them": printed("domain_gap", "crops.txt", 1),
+        "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }
 
 

@@ -89,10 +89,15 @@ class Values:
         Raises:
             InputError: it is not there.
         """
-        path = self.root / KEPT / run / f"{stem}.csv"
-        if not path.is_file():
-            raise InputError("no such run is kept", file=path, remedy=f"Keep it: {keeping(run)}")
-        return _rows(stem, path.read_text(encoding="utf-8"))
+        return _rows(stem, self.text(run, f"{stem}.csv"))
+
+    def text(self, run: str, file: str) -> str:
+        """A kept file.
+
+        Raises:
+            InputError: it is not there.
+        """
+        return _kept(self.root, run, file)
 
     def __getitem__(self, place: Place) -> float:
         file, row, column = place
@@ -157,11 +162,27 @@ def outlived(root: Path, run: Run, name: str) -> Iterator[str]:
             yield f"{KEPT}/{name}/{kept}"
 
 
+def kept_command(root: Path, name: str) -> str:
+    """The command that made a kept run."""
+    return str(_record(root, name)["command"])
+
+
 def days_of(root: Path, name: str) -> list[str]:
     """The day on which the files of a kept run were made, or the first and the last one."""
-    record = json.loads((root / KEPT / name / "run.json").read_text(encoding="utf-8"))
-    days = {source["date"] for source in record["files"]}
+    days = {source["date"] for source in _record(root, name)["files"]}
     return sorted({min(days), max(days)})
+
+
+def _record(root: Path, name: str) -> dict[str, Any]:
+    record: dict[str, Any] = json.loads(_kept(root, name, "run.json"))
+    return record
+
+
+def _kept(root: Path, name: str, file: str) -> str:
+    path = root / KEPT / name / file
+    if not path.is_file():
+        raise InputError("no such run is kept", file=path, remedy=f"Keep it: {keeping(name)}")
+    return path.read_text(encoding="utf-8")
 
 
 def _joined(files: list[Path]) -> str:

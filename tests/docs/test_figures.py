@@ -134,6 +134,21 @@ def test_a_reason_for_a_phrase_that_is_gone_is_named(project: Path):
     assert fault.page == "docs/method/claims.md"
 
 
+def test_a_page_that_is_not_covered_says_so(project: Path):
+    _replace(project / "docs" / "method" / "numbers.md", "does not check", "checks")
+    assert [fault.page for fault in doc_figures.check(project)] == ["docs/method/numbers.md"]
+
+
+def test_a_run_is_quoted_with_the_command_that_made_it(project: Path):
+    page = project / "docs" / "method" / "accuracy.md"
+    _replace(page, "--config ts40k_dir=FOLDER", "--config ts40k_dir=ELSEWHERE")
+    (fault,) = doc_figures.check(project)
+    assert "no page that quotes ts40k shows" in fault.problem
+    _replace(project / doc_figures.FIGURES, "ts40k_dir=FOLDER", "ts40k_dir=ELSEWHERE")
+    (fault,) = doc_figures.check(project)
+    assert "ts40k was kept from another command" in fault.problem
+
+
 def _last_run(project: Path) -> Path:
     """The results of the six crops, as their run writes them, with one tower more that is false."""
     text = (project / kept_runs.KEPT / "ts40k" / "components.csv").read_text(encoding="utf-8")

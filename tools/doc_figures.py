@@ -27,6 +27,7 @@ from kept_runs import (
     keep,
     keeping,
     kept_command,
+    older,
     outlived,
     read_figures,
 )
@@ -40,7 +41,7 @@ MEASURED = re.compile(
 )
 """A number that may be a measurement: with a decimal point, a percentage, a time or a size."""
 
-
+REMEDY = "Correct it: python tools/doc_figures.py --write"
 NOT_CHECKED = "`make claims` does not check"
 """What a page says of its figures if it is not covered."""
 
@@ -220,9 +221,6 @@ def _page_faults(
     yield from (Fault(page, _line(text, at), p) for at, p in _unknown(text, figures, known))
 
 
-REMEDY = "Correct it: python tools/doc_figures.py --write"
-
-
 def _differences(shown: str, right: str) -> Iterator[tuple[int, str]]:
     """Line and content of each difference between two tables."""
     before, after = shown.split("\n"), right.split("\n")
@@ -291,6 +289,9 @@ def main() -> int:
     pages = covered(ROOT, figures)
     for page, why in figures.not_covered.items():
         print(f"not covered: {page}: {why}")
+    for name, run in figures.runs.items():
+        if files := older(ROOT, name):
+            print(f"by earlier code: {KEPT}/{name}: {', '.join(files)}. Run: {run.command}")
     sentences = sum(len(s.values) for page in figures.sentences.values() for s in page)
     print(
         f"{len(pages)} pages, {sentences} figures in sentences, "

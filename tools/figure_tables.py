@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import pandas as pd
-from kept_runs import FIGURES, Figures, Values, days_of
+from kept_runs import FIGURES, Figures, Values, made_on
 
 from scenenet.core.errors import InputError
 from scenenet.experiments.components.settings import PUBLISHED, WITH, WITHOUT
@@ -121,12 +121,11 @@ def _of_run(values: Values, figures: Figures, run: str) -> str:
         for row in rows
         if row["parameters"] > 0 and row["model"] != PUBLISHED
     }
-    title, days = figures.runs[run].title, " to ".join(days_of(values.root, run))
-    most = max(seeds.values())
+    title, most = figures.runs[run].title, max(seeds.values())
     fewer = [f"{figures.sources[model]}: {n}" for model, n in seeds.items() if n < most]
     measured = {row["model"] for row in rows}
     missing = [name for model, name in figures.sources.items() if model not in measured]
-    text = f"{title[0].upper()}{title[1:]}: measured {days} with {most} seeds"
+    text = f"{title[0].upper()}{title[1:]}: measured {made_on(values.root, run)} with {most} seeds"
     text += f" ({'; '.join(fewer)})" if fewer else ""
     return text + (f"; without {'; '.join(missing)}." if missing else ".")
 

@@ -17,6 +17,7 @@ import pandas as pd
 import yaml
 from pydantic import Field, ValidationError
 
+from scenenet.core.code_hash import code_hash
 from scenenet.core.errors import InputError
 from scenenet.core.files import write_json, write_text
 from scenenet.core.settings import Settings
@@ -25,6 +26,8 @@ from scenenet.experiments.components.summary import summarise_components
 FIGURES = "docs/figures.yaml"
 KEPT = "docs/results"
 PUBLISHED = "config/thesis.yaml"
+MADE_BY = ("stage", "version", "code", "config")
+"""What is kept of ``provenance.json``."""
 SUMMARIES = {"components": summarise_components}
 """Stem of a kept file -> what makes its table, where the file has a row per run."""
 
@@ -167,10 +170,22 @@ def kept_command(root: Path, name: str) -> str:
     return str(_record(root, name)["command"])
 
 
-def days_of(root: Path, name: str) -> list[str]:
-    """The day on which the files of a kept run were made, or the first and the last one."""
-    days = {source["date"] for source in _record(root, name)["files"]}
-    return sorted({min(days), max(days)})
+def made_on(root: Path, name: str) -> str:
+    """The days on which the files of a kept run were made, and whether by one code."""
+    files = _record(root, name)["files"]
+    days = {file["date"] for file in files}
+    text = " to ".join(sorted({min(days), max(days)}))
+    same = len({file.get("code") for file in files}) == 1
+    return text if same else f"{text}, by different versions of the code,"
+
+
+def older(root: Path, name: str) -> list[str]:
+    """The files of a kept run that were made by other code than today's, where it was recorded."""
+    files = [file for file in _record(root, name)["files"] if "code" in file]
+    codes = {file["stage"]: "" for file in files}
+    for stage in codes:
+        codes[stage] = code_hash([root / "workflow" / "scripts" / f"{stage}.py"])
+    return [file["file"] for file in files if file["code"] != codes[file["stage"]]]
 
 
 def _record(root: Path, name: str) -> dict[str, Any]:
@@ -200,4 +215,4 @@ def _made_by(path: Path) -> dict[str, str]:
     day = datetime.fromtimestamp(path.stat().st_mtime, UTC).date().isoformat()
     record = path.with_name("provenance.json")
     known = json.loads(record.read_text(encoding="utf-8")) if record.is_file() else {}
-    return {"date": day} | {k: known[k] for k in ("version", "code", "config") if k in known}
+    return {"date": day} | {k: known[k] for k in MADE_BY if k in known}

@@ -25,6 +25,7 @@ def project(project_root: Path, tmp_path: Path) -> Path:
     )
     (tmp_path / "config").mkdir()
     shutil.copy(project_root / kept_runs.PUBLISHED, tmp_path / "config")
+    shutil.copytree(project_root / "workflow" / "scripts", tmp_path / "workflow" / "scripts")
     return tmp_path
 
 
@@ -159,7 +160,8 @@ def _last_run(project: Path) -> Path:
     folder.mkdir(parents=True)
     path = folder / "runs.csv"
     path.write_text("\n".join([head, ",".join(cells), *rows[1:]]) + "\n", encoding="utf-8")
-    (folder / "provenance.json").write_text(json.dumps({"code": "abc", "config": "def"}), "utf-8")
+    made_by = {"stage": "components", "code": "abc", "config": "def"}
+    (folder / "provenance.json").write_text(json.dumps(made_by), encoding="utf-8")
     return path
 
 
@@ -175,7 +177,9 @@ def test_pages_that_outlived_their_run_are_named_and_follow_the_last_one(
     monkeypatch.setattr(doc_figures, "ROOT", project)
     monkeypatch.setattr(sys, "argv", ["doc_figures.py", "--keep", "ts40k", "--write"])
     assert doc_figures.main() == 0
-    assert "no differences" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "no differences" in printed
+    assert "by earlier code: docs/results/ts40k: components/all/runs.csv" in printed
     record = json.loads((project / kept_runs.KEPT / "ts40k" / "run.json").read_text("utf-8"))
     assert record["files"][0]["code"] == "abc"
     assert doc_figures.check(project) == []

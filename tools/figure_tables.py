@@ -15,6 +15,7 @@ from scenenet.experiments.components.summary import COUNTED
 from scenenet.metrics.score_columns import TRUTH
 
 Row = Mapping[str, Any]
+LINE_ERRORS = ("error", "height_error", "base_error")
 
 
 class Table(NamedTuple):
@@ -74,6 +75,21 @@ def short_table(values: Values, figures: Figures, runs: Mapping[str, str]) -> st
     return "\n".join([*lines, "", " ".join(_of_run(values, figures, run) for run in runs)])
 
 
+def lines_table(values: Values, run: str) -> str:
+    """Towers and their points in synthetic lines, against the truth: a row for each seed."""
+    head = "seed of the line | found / towers | false | precision of points | recall | IoU"
+    lines = [f"| {head} | position, m | height, m | base, m |", "|---" * 9 + "|"]
+    for row in sorted(values.rows(run, "lines"), key=lambda row: int(row["file"])):
+        towers, points = "truth.towers.", "truth.points."
+        there = row[f"{towers}n_true"]
+        found = round(row[f"{towers}recall"] * there)
+        cells = [row["file"], f"{found} / {there}", row[f"{towers}n_predicted"] - found]
+        cells += [f"{row[points + name]:.2f}" for name in ("precision", "recall", "iou")]
+        cells += [f"{row[f'{towers}median_{name}_m']:.2f}" for name in LINE_ERRORS]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(lines)
+
+
 def printed_table(values: Values, run: str, file: str, number: int) -> str:
     """One of the tables that a command printed, the first is 0."""
     return values.text(run, file).strip().split("\n\n")[number]
@@ -96,6 +112,7 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of the six crops": of_one("ts40k", ""),
         "figures of synthetic and real crops": printed("domain_gap", "crops.txt", 0),
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
+        "figures of synthetic lines": Table(("lines",), partial(lines_table, values, "lines")),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }
 

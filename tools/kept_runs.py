@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from functools import cache
 from io import StringIO
@@ -19,7 +19,7 @@ from pydantic import Field, ValidationError
 
 from scenenet.core.code_hash import code_hash
 from scenenet.core.errors import InputError
-from scenenet.core.files import write_json, write_text
+from scenenet.core.files import read_json, write_json, write_text
 from scenenet.core.settings import Settings
 from scenenet.experiments.components.summary import summarise_components
 
@@ -43,7 +43,7 @@ class Run(Settings):
     command: str = Field(description="what makes the results, in the project folder")
     results: str = Field(description="folder that the command writes")
     files: dict[str, str] = Field(
-        description="kept file -> files of the results; those of a pattern are joined"
+        description="kept file -> files of the results; those of a pattern become one table"
     )
 
 
@@ -109,7 +109,7 @@ class Values:
             return float(numbers[row][column])
         cells = row.split(", ")
         rows = self.rows(*file.split("/"))
-        found = [one for one in rows if [*one.values()][: len(cells)] == cells]
+        found = [one for one in rows if [str(cell) for cell in one.values()][: len(cells)] == cells]
         if len(found) != 1 or pd.isna(found[0].get(column)):
             raise InputError(
                 f"{len(found)} rows begin with {row!r} and a number in {column!r}, not one",
@@ -201,13 +201,28 @@ def _kept(root: Path, name: str, file: str) -> str:
 
 
 def _joined(files: list[Path]) -> str:
-    """Files as one; CSV files must have the same columns."""
+    """Files as one. CSV files must have the same columns; of a JSON file the single values become a
+    row, with the name of the file first."""
+    if files[0].suffix == ".json":
+        rows = [
+            {"file": path.name.partition(".")[0], **dict(_flat(read_json(path)))} for path in files
+        ]
+        return pd.DataFrame(rows).to_csv(index=False, float_format="%.6g")
     head, *_ = texts = [path.read_text(encoding="utf-8") for path in files]
     columns = head.partition("\n")[0]
     for path, text in zip(files, texts, strict=True):
         if len(files) > 1 and text.partition("\n")[0] != columns:
             raise InputError(f"the columns are not those of {files[0]}", file=path)
     return head + "".join(text.partition("\n")[2] for text in texts[1:])
+
+
+def _flat(data: Mapping[str, Any], start: str = "") -> Iterator[tuple[str, Any]]:
+    """Key and value of each single value; the keys on the way to it are joined by dots."""
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{start}{key}.")
+        elif not isinstance(value, list):
+            yield f"{start}{key}", value
 
 
 def _made_by(path: Path) -> dict[str, str]:

@@ -15,6 +15,13 @@ from scenenet.experiments.components.summary import COUNTED
 from scenenet.metrics.score_columns import TRUTH
 
 Row = Mapping[str, Any]
+PROPERTY = {"property": "property", "unit": "unit"}
+RANGE = {"lowest": "lowest", "highest": "highest"}
+THESIS = {"thesis_lowest": "thesis: lowest", "thesis_highest": "highest"}
+DATASET = PROPERTY | {"value": "value"} | RANGE | {"thesis": "thesis"} | THESIS
+LABELLED = PROPERTY | {"mean": "mean"} | RANGE | {"thesis_mean": "thesis"} | THESIS
+CLASSES = {"code": "code", "class": "class", "share_percent": "%", "thesis_percent": "thesis, %"}
+"""Columns of the tables of a dataset -> their headings."""
 LINE_ERRORS = ("error", "height_error", "base_error")
 
 
@@ -90,6 +97,22 @@ def lines_table(values: Values, run: str) -> str:
     return "\n".join(lines)
 
 
+def csv_table(values: Values, run: str, stem: str, columns: Mapping[str, str]) -> str:
+    """Some columns of a kept CSV file.
+
+    Args:
+        values: of the kept runs.
+        run: its name.
+        stem: of the file.
+        columns: name -> heading.
+    """
+    lines = [f"| {' | '.join(columns.values())} |", "|---" * len(columns) + "|"]
+    for row in values.rows(run, stem):
+        cells = ("" if pd.isna(row[name]) else _short(row[name]) for name in columns)
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def printed_table(values: Values, run: str, file: str, number: int) -> str:
     """One of the tables that a command printed, the first is 0."""
     return values.text(run, file).strip().split("\n\n")[number]
@@ -101,6 +124,9 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
     def of_one(run: str, against: str) -> Table:
         return Table((run,), partial(accuracy_table, values, figures, run, against))
 
+    def of_csv(run: str, stem: str, columns: Mapping[str, str]) -> Table:
+        return Table((run,), partial(csv_table, values, run, stem, columns))
+
     def printed(run: str, file: str, number: int) -> Table:
         return Table((run,), partial(printed_table, values, run, file, number))
 
@@ -110,6 +136,9 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of synthetic crops against the truth": of_one("synthetic", TRUTH),
         "figures of synthetic crops against the labels": of_one("synthetic", ""),
         "figures of the six crops": of_one("ts40k", ""),
+        "figures of the dataset": of_csv("dataset", "dataset", DATASET),
+        "figures of its labelled towers": of_csv("dataset", "towers", LABELLED),
+        "figures of its classes": of_csv("dataset", "classes", CLASSES),
         "figures of synthetic and real crops": printed("domain_gap", "crops.txt", 0),
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
         "figures of synthetic lines": Table(("lines",), partial(lines_table, values, "lines")),
@@ -164,6 +193,13 @@ def _towers(row: Row, against: str) -> str:
         for end in ("", "_worst")
     )
     return f"{mean} ({worst})" if row["n_seeds"] > 1 else mean
+
+
+def _short(cell: Any) -> str:
+    """Four digits of a number and more before the point; anything else as it is."""
+    if not isinstance(cell, float):
+        return str(cell)
+    return f"{cell:.0f}" if abs(cell) >= 1e4 else f"{cell:.4g}"
 
 
 def tidy(number: float) -> str:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import doc_figures
+import figure_tables
 import kept_runs
 import pytest
 
@@ -200,3 +201,31 @@ def test_a_place_that_the_run_does_not_have_is_named(project: Path):
         values["ts40k/components", "no such", "point_f05"]
     with pytest.raises(ValueError, match="no such run is kept"):
         values["none/components", "rules alone", "point_f05"]
+
+
+def test_the_single_values_of_json_files_become_a_table(tmp_path: Path):
+    results = tmp_path / "results"
+    results.mkdir()
+    for name, found in (("a", 3), ("b", None)):
+        scores = {"truth": {"towers": {"found": found}, "curve": [1, 2]}, "alive": True}
+        (results / f"{name}.scores.json").write_text(json.dumps(scores), encoding="utf-8")
+    run = kept_runs.Run(
+        title="two", command="make two", results="results", files={"two.csv": "*.scores.json"}
+    )
+    assert kept_runs.keep(tmp_path, "both", run, results) == ["a.scores.json", "b.scores.json"]
+    values = kept_runs.Values(tmp_path)
+    assert [*values.rows("both", "two")[0]] == ["file", "truth.towers.found", "alive"]
+    assert values["both/two", "a", "truth.towers.found"] == 3
+    with pytest.raises(ValueError, match="1 rows begin with 'b' and a number in"):
+        values["both/two", "b", "truth.towers.found"]
+    assert figure_tables.csv_table(
+        values, "both", "two", {"file": "x", "truth.towers.found": "y"}
+    ) == ("| x | y |\n|---|---|\n| a | 3 |\n| b |  |")
+
+
+def test_files_of_different_columns_are_not_joined(tmp_path: Path):
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.csv").write_text(f"{name}\n1\n", encoding="utf-8")
+    run = kept_runs.Run(title="", command="", results="", files={"all.csv": "*.csv"})
+    with pytest.raises(ValueError, match=r"b\.csv: the columns are not those of .*a\.csv"):
+        kept_runs.keep(tmp_path, "all", run, tmp_path)

@@ -277,16 +277,18 @@ def main() -> int:
             run = figures.runs[name]
             files = keep(ROOT, name, run, options.results or ROOT / run.results)
             print(f"{KEPT}/{name}: {', '.join(files)}")
-        for page in covered(ROOT, figures) if options.write else ():
-            text = (ROOT / page).read_text(encoding="utf-8")
-            write_text(ROOT / page, corrected(page, text, figures, values))
+        pages = covered(ROOT, figures)
+        texts = {page: (ROOT / page).read_text(encoding="utf-8") for page in pages}
+        if options.write:
+            right = {page: corrected(page, text, figures, values) for page, text in texts.items()}
+            for page in (page for page in pages if right[page] != texts[page]):
+                write_text(ROOT / page, right[page])
         faults = check(ROOT)
     except InputError as error:
         print(error, file=sys.stderr)
         return 1
     for fault in faults:
         print(f"{fault.page}:{fault.line}: {fault.problem}")
-    pages = covered(ROOT, figures)
     for page, why in figures.not_covered.items():
         print(f"not covered: {page}: {why}")
     for name, run in figures.runs.items():

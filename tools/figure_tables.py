@@ -167,7 +167,7 @@ def _of_run(values: Values, figures: Figures, run: str) -> str:
         for row in rows
         if row["parameters"] > 0 and row["model"] != PUBLISHED
     }
-    title, most = figures.runs[run].title, max(seeds.values())
+    title, most = figures.runs[run].title, max(seeds.values(), default=1)
     fewer = [f"{figures.sources[model]}: {n}" for model, n in seeds.items() if n < most]
     measured = {row["model"] for row in rows}
     missing = [name for model, name in figures.sources.items() if model not in measured]

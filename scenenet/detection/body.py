@@ -113,16 +113,21 @@ def centre_body(
     within_level = np.zeros((3, 3, 3))
     within_level[:, :, 1] = 1
     piece = label(volume, within_level)[0][tuple(steps.T)]
+    # Level by level, so that all levels are measured at once.
+    order = np.argsort(steps[:, 2], kind="stable")
+    places, level, piece = places[order], steps[order, 2], piece[order]
     for multiple in SEARCH_RADII:
         near = np.hypot(places[:, 0] - at[0], places[:, 1] - at[1]) <= multiple * slim
-        in_body = np.isin(piece, np.unique(piece[near]))
-        centres = []
-        for level in np.unique(steps[in_body, 2]):
-            found = places[in_body & (steps[:, 2] == level), :2]
-            size = np.ptp(found, axis=0) + voxel_size
-            if size.max() <= 2 * slim + voxel_size:
-                centres.append((found.min(axis=0) + found.max(axis=0)) / 2)
-        if centres:
-            at = np.median(centres, axis=0)
-            free = len(centres) / len(np.unique(steps[in_body, 2]))
+        if not near.any():
+            continue
+        reached = np.zeros(piece.max() + 1, bool)
+        reached[piece[near]] = True
+        in_body = reached[piece]
+        _, first = np.unique(level[in_body], return_index=True)
+        least = np.minimum.reduceat(places[in_body, :2], first)
+        greatest = np.maximum.reduceat(places[in_body, :2], first)
+        stands_free = (greatest - least + voxel_size).max(axis=1) <= 2 * slim + voxel_size
+        if stands_free.any():
+            at = np.median((least + greatest)[stands_free] / 2, axis=0)
+            free = float(stands_free.mean())
     return axis + at, free

@@ -198,6 +198,11 @@ class Config(Settings):
                 f"predict.model: {self.predict.model!r} is not one of the models: "
                 f"{', '.join(known)}"
             )
+        for model in self.models:
+            if not model.training.epochs:
+                raise ValueError(
+                    f"model {model.name}: training.epochs 0 is only for a study; give at least 1"
+                )
         for study in self.studies:
             if study.model not in known:
                 raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")

@@ -43,8 +43,8 @@ BOOSTED_TREES = "boosted trees"
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
 
 Protocol = Literal["thesis", "operational"]
-Init = Literal["thesis", "informed", "unranged", "handcrafted"]
-GENEO_INITS: tuple[Init, ...] = ("unranged", "handcrafted")
+Init = Literal["thesis", "informed", "unranged", "handcrafted", "published"]
+GENEO_INITS: tuple[Init, ...] = ("unranged", "handcrafted", "published")
 """Initialisations that only a SCENE-Net has, because a CNN has no parameter ranges."""
 
 
@@ -152,9 +152,13 @@ class TrainingSettings(Settings):
         "informed: the best of many draws on the training crops, and for a CNN Fisher's "
         "discriminant between the surroundings of tower voxels and other voxels. Only for a "
         "SCENE-Net (thesis 5.3.4): unranged: drawn from N(0, 1); handcrafted: values chosen by "
-        "hand, the same for every seed",
+        "hand, the same for every seed; published: the weights of the code of the thesis",
     )
-    epochs: int = Field(50, ge=1, description="passes over the training set")
+    epochs: int = Field(
+        50,
+        ge=0,
+        description="passes over the training set; a study may score initial models with 0",
+    )
     batch_size: int = Field(8, ge=1, description="crops per step")
     optimiser: Literal["rmsprop", "adam", "sgd"] = Field("rmsprop", description="torch optimiser")
     learning_rate: float = Field(
@@ -259,6 +263,11 @@ class ModelSettings(Settings):
             raise ValueError(
                 f"training.init {self.training.init} is for a SCENE-Net; a CNN has no parameter "
                 "ranges"
+            )
+        if self.training.init == "published" and self.geneos != THESIS_GENEOS:
+            raise ValueError(
+                f"training.init published: the published weights are those of "
+                f"{', '.join(THESIS_GENEOS)}; remove geneos"
             )
         return self
 

@@ -4,6 +4,7 @@
   a CNN as torch draws them.
 - ``unranged``: "not enforcing ranges" (5.3.4), every number of a SCENE-Net from N(0, 1).
 - ``handcrafted``: "handcrafted values" (5.3.4), the same for every seed.
+- ``published``: the weights of the code of the thesis (``scenenet.models.published_weights``).
 - ``informed``: chosen by the training crops.
 
 A model is dead if its observer is negative at all voxels that matter: ReLU then gives zero and no
@@ -30,6 +31,7 @@ from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
 from scenenet.models.factory import new_model
 from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.published_weights import WEIGHTS
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import KernelSize, ModelSettings
 
@@ -54,6 +56,8 @@ def starting_model(
         model.set_numbers(torch.randn(model.n_parameters(), generator=generator).numpy())
     if isinstance(model, GeneoModel) and init == "handcrafted":
         model.set_shape_parameters(handcrafted(model))
+    if isinstance(model, GeneoModel) and init == "published":
+        model.set_shape_parameters(WEIGHTS)
     return model
 
 

@@ -12,6 +12,7 @@ from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.geneo import kernel_named
 from scenenet.models.factory import new_model
 from scenenet.models.predictions import threshold_curve
+from scenenet.models.published_weights import WEIGHTS
 from scenenet.models.settings import ModelSettings, TrainingSettings
 from scenenet.training.initialisation import discriminant, informed_model, starting_model
 from scenenet.training.train import fit
@@ -109,7 +110,21 @@ def test_handcrafted_values_are_in_their_ranges_and_equal_for_every_seed(toys):
     assert numbers["cylinder.r"] == pytest.approx(2.0)  # half of 4.15 m, in voxels of a metre
 
 
-@pytest.mark.parametrize("init", ["unranged", "handcrafted"])
+@pytest.mark.parametrize("init", ["unranged", "handcrafted", "published"])
 def test_unranged_initialisation_of_a_cnn_is_refused(init):
     with pytest.raises(ValueError, match=r"training.init .* a CNN has no parameter ranges"):
         settings("cnn", init)
+
+
+def test_published_weights_are_the_same_for_every_seed(toys):
+    published = settings("scenenet", "published")
+    models = [starting_model(published, seed, toys) for seed in (0, 1)]
+    for model in models:
+        assert model.shape_parameters() == pytest.approx(WEIGHTS, abs=1e-5)
+
+
+def test_published_weights_need_the_kernels_of_the_thesis():
+    with pytest.raises(ValueError, match="remove geneos"):
+        ModelSettings(
+            name="m", kind="scenenet", geneos=["cylinder"], training={"init": "published"}
+        )

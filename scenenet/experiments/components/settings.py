@@ -17,7 +17,7 @@ RULES_ALONE = "rules alone"
 RANDOM = "random parameters"
 """Name of an untrained model, with tau chosen as for a trained one."""
 PUBLISHED = "published weights"
-"""Name of the model of ``scenenet.baselines.published_weights``."""
+"""Name of the model of ``scenenet.models.published_weights``."""
 SHAPE_PRIORS = "shape priors"
 """Name of the method of ``scenenet.baselines.shape_priors``."""
 HIGH_M = 3.0

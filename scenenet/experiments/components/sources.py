@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from scenenet.baselines.published_weights import published_scenenet
 from scenenet.baselines.shape_priors import cut_out, height_above_ground
 from scenenet.convolution.coarsening import block_edge
 from scenenet.dataset.crops import Crop
@@ -29,6 +28,7 @@ from scenenet.models.base import VoxelModel
 from scenenet.models.factory import new_model
 from scenenet.models.model_file import read_model
 from scenenet.models.predictions import probabilities
+from scenenet.models.published_weights import published_scenenet
 from scenenet.models.settings import BOOSTED_TREES, ModelSettings
 from scenenet.pointcloud import PointCloud
 from scenenet.training.tuning import tuned_tau

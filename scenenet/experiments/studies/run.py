@@ -53,7 +53,7 @@ def run_study(
 
     tau is chosen on the validation crops after the ``applied`` changes, as for the scores. Variants
     that differ only in ``applied`` changes share their trainings. A training that diverges counts
-    as a dead model: its row has no loss.
+    as a dead model: its row has no loss. Nor has one of no epochs, which is an initial model.
 
     Args:
         crop_manifests: of the crop stores.
@@ -125,7 +125,8 @@ def _trained(
     begin = time.perf_counter()
     try:
         model, history = fit(training, [], settings, seed)
-        found = {"epochs": len(history), "loss": float(history["loss"].iloc[-1]), **_lowest(model)}
+        loss = float(history["loss"].iloc[-1]) if len(history) else math.nan
+        found = {"epochs": len(history), "loss": loss, **_lowest(model)}
     except LostTraining as error:
         print(error, file=sys.stderr)
         model, found = None, dict.fromkeys(("epochs", "loss", *LOWEST), math.nan)

@@ -78,7 +78,7 @@ def test_changes_apply_to_their_variant_and_common_ones_to_all():
     ("changes", "named"),
     [
         ({"training.los.alpha": 1}, "los"),
-        ({"training.epochs": 0}, "epochs"),
+        ({"training.epochs": -1}, "epochs"),
         ({"split.train": 0.9}, "sum to 1"),
         ({"applied.tau": 0.5}, "applied.tau"),
         ({"voxels.resolution": 48}, "resolution"),
@@ -196,6 +196,21 @@ def test_models_of_other_kinds_are_trained_and_scored_too(crops, tmp_path):
     assert rows["none"]["lowest_shape"] == pytest.approx(drawn[:9].min().item(), abs=0.3)
     # In metres numbers are positive by construction.
     assert min(rows["metres"]["lowest_weight"], rows["metres"]["lowest_shape"]) > 0
+
+
+def test_initial_models_are_scored_without_training(crops, tmp_path):
+    published = {"training.init": "published", "kernel_size": [9, 5, 5]}
+    defined = study(
+        common={"training.epochs": 0},
+        variants=[{"name": "published", "changes": published}, {"name": "drawn"}],
+    )
+    table = run_study(crops, defined, MODEL, GRID, SPLIT, *files(tmp_path))
+    assert (table["epochs"] == 0).all()
+    assert table["loss"].isna().all()
+    one, other = table[table["variant"] == "published"]["f05"]
+    assert one == other  # whatever the seed
+    one, other = table[table["variant"] == "drawn"]["lowest_shape"]
+    assert one != other
 
 
 def test_a_diverged_training_counts_as_dead_and_the_others_continue(crops, tmp_path):

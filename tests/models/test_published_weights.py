@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scenenet.baselines.published_weights import WEIGHTS, published_scenenet
+from scenenet.models.published_weights import WEIGHTS, published_scenenet
 
 
 def test_the_model_has_the_published_numbers():

@@ -6,10 +6,13 @@ CORES ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
-.PHONY: reproduce test claims trust package docs bench pictures lint clean help
+.PHONY: reproduce demo test claims trust package docs bench pictures lint clean help
 
 reproduce: $(INSTALLED)  ## all results of the default configuration, under results/
 	$(VENV)/bin/snakemake --cores $(CORES)
+
+demo: $(INSTALLED)  ## a survey, its tower map and a report in minutes, under results/demo/
+	$(VENV)/bin/snakemake --cores $(CORES) --configfile config/demo.yaml -- results/demo/report/index.html
 
 test: $(INSTALLED)  ## the tests
 	$(VENV)/bin/python -m pytest -n $(CORES) --no-loadscope-reorder

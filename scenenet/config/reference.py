@@ -29,7 +29,9 @@ given has the default below. `RESULTS_DIR/config.yaml` has all settings of a run
 |---|---|
 | `config.yaml` | the full reproduction, on synthetic surveys |
 | `full.yaml` | chapter 5 of the thesis at its own scale, on 2823 synthetic crops |
-| `test.yaml` | the same stages in minutes |
+| `main.yaml` | the main comparison only: `--configfile config/full.yaml config/main.yaml` |
+| `demo.yaml` | a survey, its tower map and a report: `make demo` |
+| `test.yaml` | every stage in minutes |
 | `ts40k.yaml` | real samples of TS40K: `--config ts40k_dir=FOLDER` |
 | `studies.yaml` | the studies of the thesis; see `docs/guides/studies.md` |
 | `surveys.tsv` | the survey sheet; see `docs/guides/surveys.md` |

@@ -129,6 +129,9 @@ class Config(Settings):
         description="values, by dotted name, for settings that studies change in `common` or in "
         "`changes`; they replace those values in every study",
     )
+    only_studies: tuple[str, ...] | None = Field(
+        None, description="names of the studies to run; null for all of them"
+    )
     studies: tuple[StudySettings, ...] = Field(
         (),
         description="series of short trainings that differ in one setting; see config/studies.yaml",
@@ -164,6 +167,20 @@ class Config(Settings):
             for model in models
         ]
         return {**raw, "models": filled}
+
+    @model_validator(mode="after")
+    def _chosen_studies(self) -> Self:
+        """Leave out the studies that are not to be run."""
+        if self.only_studies is None:
+            return self
+        names = [study.name for study in self.studies]
+        if unknown := [name for name in self.only_studies if name not in names]:
+            raise ValueError(
+                f"only_studies: {', '.join(unknown)} is none of the studies: {', '.join(names)}"
+            )
+        chosen = tuple(study for study in self.studies if study.name in self.only_studies)
+        object.__setattr__(self, "studies", chosen)
+        return self
 
     @model_validator(mode="before")
     @classmethod

@@ -77,11 +77,33 @@ def _negative(e: Evidence, penalty: str) -> pd.Series:
     return (e.study("penalty", variant, "lowest_weight") < 0).astype(float)
 
 
+def _compared(
+    name: str,
+    place: str,
+    says: str,
+    statistic: str,
+    holds: tuple[float, float],
+    study: str,
+    one: str,
+    other: str,
+    reference: str | None = None,
+) -> Claim:
+    """A claim about the F0.5 of a variant minus that of another of the same study.
+
+    Args:
+        name, place, says, statistic, holds: of the claim.
+        study, one, other: what is compared.
+        reference: the variant that must have skill; None for ``one``.
+    """
+    skill = (_skilled(study, reference or one),)
+    return Claim(name, place, says, statistic, holds, _gain(study, one, other), skill, study)
+
+
 def _ablation(name: str, variant: str, says: str) -> Claim:
     """One of each detects more than another number of operators."""
-    return Claim(
+    return _compared(
         f"ablation.{name}", "5.3.5, Table 5.5", says, f"F0.5, one of each minus {variant}",
-        POSITIVE, _gain("ablations", BEST, variant), (_skilled("ablations", BEST),), "ablations",
+        POSITIVE, "ablations", BEST, variant,
     )  # fmt: skip
 
 
@@ -115,12 +137,11 @@ KERNELS = (
         "mean IoU over tower and background at 9x5x5 minus that at 9x9x9", (-0.02, 0.02),
         _gain("kernel-after-training", TALL, SMALL, "miou"), RESAMPLED, "kernel-after-training",
     ),
-    Claim(
+    _compared(
         "resolution", "5.2.7, Figure 5.10",
         "A model trained at 64 voxels a side is as good at 128.", "F0.5 at 128 minus that at 64",
-        (-EQUAL, np.inf),
-        _gain("resolution-after-training", "resolution 128", "resolution 64"),
-        (_skilled("resolution-after-training", "resolution 64"),), "resolution-after-training",
+        (-EQUAL, np.inf), "resolution-after-training", "resolution 128", "resolution 64",
+        "resolution 64",
     ),
     Claim(
         "kernel.bigger", "5.3.4", "Bigger kernels are better in training.",
@@ -143,22 +164,20 @@ KERNELS = (
 )  # fmt: skip
 
 LOSS = (
-    Claim(
+    _compared(
         "measurement.better", "5.3.2", "Presence is a better measurement than density.",
         "F0.5 with presence minus that with density", POSITIVE,
-        _gain("measurement", "measurement presence", "measurement density"),
-        (_skilled("measurement", "measurement presence"),), "measurement",
+        "measurement", "measurement presence", "measurement density",
     ),
     Claim(
         "measurement.loss", "5.3.2", "The loss is lower by 42 % with presence than with density.",
         "share of the loss with density that presence saves", about(0.42), _lower_loss,
         (_skilled("measurement", "measurement presence"),), "measurement",
     ),
-    Claim(
+    _compared(
         "fidelity", "5.3.3", "Cross entropy is all-around worse than the squared error.",
         "F0.5 with the squared error minus that with cross entropy", POSITIVE,
-        _gain("fidelity", "fidelity squared", "fidelity cross_entropy"),
-        (_skilled("fidelity", "fidelity squared"),), "fidelity",
+        "fidelity", "fidelity squared", "fidelity cross_entropy",
     ),
     Claim(
         "penalty", "5.3.3, Figure 4.5",
@@ -193,10 +212,10 @@ LOSS = (
 )  # fmt: skip
 
 TRAINING = (
-    Claim(
+    _compared(
         "epochs.enough", "5.3.4", "No more than 10 epochs are effective.",
         "F0.5 after 10 epochs minus that after 50", (-EQUAL, np.inf),
-        _gain("epochs", "epochs 10", "epochs 50"), (_skilled("epochs", "epochs 50"),), "epochs",
+        "epochs", "epochs 10", "epochs 50", "epochs 50",
     ),
     Claim(
         "epochs.consistent", "5.3.4", "50 epochs are more consistent across runs than 10.",
@@ -217,25 +236,22 @@ TRAINING = (
         lambda e: intervals.paired(_mean(e, "decay", DECAYS), e.study("decay", "none", "f05")),
         (_skilled("decay", "none"),), "decay",
     ),
-    Claim(
+    _compared(
         "init.ranges", "5.3.4", "Initial values drawn without ranges are worse.",
         "F0.5 with ranges minus that without", POSITIVE,
-        _gain("initialisation", "thesis ranges", "no ranges"),
-        (_skilled("initialisation", "thesis ranges"),), "initialisation",
+        "initialisation", "thesis ranges", "no ranges",
     ),
-    Claim(
+    _compared(
         "init.hand", "5.3.4", "Initial values set by hand are worse.",
         "F0.5 with ranges minus that with values set by hand", POSITIVE,
-        _gain("initialisation", "thesis ranges", "by hand"),
-        (_skilled("initialisation", "thesis ranges"),), "initialisation",
+        "initialisation", "thesis ranges", "by hand",
     ),
     *(
-        Claim(
+        _compared(
             f"optimiser.{other}", "5.3.4",
             f"RMSProp and {name} make no noticeable difference.",
             f"F0.5 with RMSProp minus that with {name}", (-EQUAL, EQUAL),
-            _gain("optimiser", "optimiser rmsprop", f"optimiser {other}"),
-            (_skilled("optimiser", "optimiser rmsprop"),), "optimiser",
+            "optimiser", "optimiser rmsprop", f"optimiser {other}",
         )
         for other, name in (("adam", "Adam"), ("sgd", "SGD"))
     ),

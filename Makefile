@@ -6,7 +6,7 @@ CORES ?= 2
 VENV := .venv
 INSTALLED := $(VENV)/.installed
 
-.PHONY: reproduce demo test claims trust package docs bench pictures lint clean help
+.PHONY: reproduce demo model test claims trust package docs bench pictures lint clean help
 
 reproduce: $(INSTALLED)  ## every result: those of the tool, and the main comparison of the thesis
 	$(VENV)/bin/snakemake --cores $(CORES)
@@ -14,6 +14,10 @@ reproduce: $(INSTALLED)  ## every result: those of the tool, and the main compar
 
 demo: $(INSTALLED)  ## a survey, its tower map and a report in minutes, under results/demo/
 	$(VENV)/bin/snakemake --cores $(CORES) --configfile config/demo.yaml -- results/demo/report/index.html
+
+model: $(INSTALLED)  ## train the model that comes with the package again, and put it in
+	$(VENV)/bin/snakemake --cores $(CORES) -- results/packaged/towers.json
+	cp results/packaged/towers.json results/packaged/towers.md scenenet/models/packaged/
 
 test: $(INSTALLED)  ## the tests
 	$(VENV)/bin/python -m pytest -n $(CORES) --no-loadscope-reorder

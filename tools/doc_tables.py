@@ -17,8 +17,7 @@ def tower_list() -> str:
     """Every property of a tower in the tower list."""
     from scenenet.detection.survey_tower import TOWER_COLUMNS
 
-    properties = [c for c in TOWER_COLUMNS if not c.geometry]
-    return _table("property", ((c.name, c.unit, c.description) for c in properties))
+    return _table("column", ((c.name, c.unit, c.description) for c in TOWER_COLUMNS))
 
 
 def class_schemes() -> str:

@@ -11,6 +11,7 @@ import typer
 
 from scenenet.dataset import voxels
 from scenenet.models import settings
+from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.class_schemes import SCHEMES, difference
 
 if TYPE_CHECKING:
@@ -52,7 +53,12 @@ Labelled = Annotated[
 ]
 ModelFile = Annotated[
     Path,
-    typer.Option("--model", help="Model file that scenenet train wrote (.json, .safetensors)."),
+    typer.Option(
+        "--model",
+        help="Model file that scenenet train wrote (.json, .safetensors).",
+        show_default="the model that comes with the package",
+        default_factory=packaged_model,
+    ),
 ]
 LabelCodes = Annotated[
     Codes, typer.Option("--codes", help=f"Class scheme of the labels ({difference()}).")

@@ -1,13 +1,13 @@
 """The tower list of a survey, with the only declaration of its columns.
 
-The GeoJSON, the tables of the report and the reference page all follow from the fields of
-``SurveyTower``. A new column needs a new field here and the code that measures it
-(``scenenet.prediction.tile_predictions``).
+The CSV, GeoPackage and GeoJSON files, the tables of the report and the reference page all follow
+from the fields of ``SurveyTower``. A new column needs a new field here and the code that measures
+it (``scenenet.prediction.tile_predictions``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -16,16 +16,8 @@ from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 
 
-def _column(
-    unit: str,
-    description: str,
-    *,
-    heading: str | None = None,
-    name: str | None = None,
-    geometry: bool = False,
-) -> Any:
-    facts = {"unit": unit, "description": description, "heading": heading}
-    return field(metadata=facts | {"name": name, "geometry": geometry})
+def _column(unit: str, description: str, *, heading: str | None = None) -> Any:
+    return field(metadata={"unit": unit, "description": description, "heading": heading})
 
 
 @dataclass(frozen=True)
@@ -34,14 +26,11 @@ class SurveyTower:
 
     id: int = _column("", "number in the list, from 1", heading="tower")
     x: float = _column(
-        "m", "easting of the axis of its body, in the CRS of the survey", heading="x",
-        geometry=True,
-    )  # fmt: skip
-    y: float = _column("m", "northing of the same place", heading="y", geometry=True)
-    height: float = _column("m", "height of its top above the ground at its axis", heading="height")
-    base: float = _column(
-        "m", "elevation of the ground at its axis", heading="base elevation", name="base_elevation"
+        "m", "easting of the axis of its body, in the CRS of the survey", heading="x"
     )
+    y: float = _column("m", "northing of the same place", heading="y")
+    height: float = _column("m", "height of its top above the ground at its axis", heading="height")
+    base: float = _column("m", "elevation of the ground at its axis", heading="base elevation")
     width: float = _column(
         "m", "width of its body at half its height, of one pole for a portal", heading="width"
     )
@@ -63,14 +52,13 @@ class SurveyTower:
         "support a tower, negative ones oppose it",
     )  # fmt: skip
 
-    def to_feature(self) -> dict[str, Any]:
-        """The tower as a GeoJSON feature."""
-        properties = {c.name: _plain(c.value(self)) for c in TOWER_COLUMNS if not c.geometry}
+    def to_feature(self, coordinates: Sequence[float]) -> dict[str, Any]:
+        """The tower as a GeoJSON feature at ``coordinates``."""
         return {
             "type": "Feature",
             "id": self.id,
-            "geometry": {"type": "Point", "coordinates": [self.x, self.y]},
-            "properties": properties,
+            "geometry": {"type": "Point", "coordinates": list(coordinates)},
+            "properties": {c.name: _plain(c.value(self)) for c in TOWER_COLUMNS},
         }
 
     @classmethod
@@ -80,11 +68,17 @@ class SurveyTower:
         Raises:
             KeyError: a column is missing.
         """
-        x, y = feature["geometry"]["coordinates"][:2]
-        properties = feature["properties"]
-        values = {c.field: properties[c.name] for c in TOWER_COLUMNS if not c.geometry}
+        values = {c.name: feature["properties"][c.name] for c in TOWER_COLUMNS}
         values["conductor_bearings"] = tuple(values["conductor_bearings"])
-        return cls(x=x, y=y, **values)
+        return cls(**values)
+
+    def to_row(self) -> dict[str, Any]:
+        """The tower as a row of plain values: bearings as a text, a column for each GENEO."""
+        row = {c.name: c.value(self) for c in TOWER_COLUMNS if c.name != "contributions"}
+        row["conductor_bearings"] = " ".join(
+            f"{bearing:.1f}" for bearing in self.conductor_bearings
+        )
+        return row | {f"contribution_{name}": share for name, share in self.contributions.items()}
 
 
 @dataclass(frozen=True)
@@ -92,34 +86,28 @@ class TowerColumn:
     """A column of the tower list.
 
     Attributes:
-        field: attribute of ``SurveyTower``.
-        name: name in files.
+        name: attribute of ``SurveyTower``, and name in files.
         unit: ``m``, ``degrees``, ``1`` for a ratio, empty for a count or number.
         description: what it is, for the reference page.
         heading: name in tables for people, without the unit; None where tables leave it out.
-        geometry: whether GeoJSON has it as the geometry and not as a property.
     """
 
-    field: str
     name: str
     unit: str
     description: str
     heading: str | None
-    geometry: bool
 
     def value(self, tower: SurveyTower) -> Any:
         """The value of this column for a tower."""
-        return getattr(tower, self.field)
+        return getattr(tower, self.name)
 
 
 TOWER_COLUMNS = tuple(
     TowerColumn(
-        field=f.name,
-        name=f.metadata["name"] or f.name,
+        name=f.name,
         unit=f.metadata["unit"],
         description=f.metadata["description"],
         heading=f.metadata["heading"],
-        geometry=f.metadata["geometry"],
     )
     for f in fields(SurveyTower)
 )

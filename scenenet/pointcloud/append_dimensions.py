@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,8 @@ MAX_RECORD, MAX_EXTRA = 0xFFFF, 0xFFFF // 192
 most ``MAX_RECORD``."""
 Values = Callable[[np.ndarray], Mapping[str, np.ndarray]]
 """Coordinates (n, 3) -> name -> (n,) values."""
+Classify = Callable[[Mapping[str, np.ndarray], np.ndarray], np.ndarray]
+"""Values of the new dimensions, class codes (n,) -> new class codes (n,)."""
 
 
 def add_dimensions(
@@ -43,6 +46,7 @@ def add_dimensions(
     names: Mapping[str, Dimension],
     values: Values,
     state: FileState | None = None,
+    classify: Classify | None = None,
 ) -> int:
     """Write a copy of a survey, with all of its points and content, and further dimensions.
 
@@ -59,6 +63,7 @@ def add_dimensions(
             each name.
         state: of the survey when ``values`` was made; None for now. Another state is an error,
             and ``target`` stays as it was.
+        classify: gives each point its class code; None to keep all codes.
 
     Returns:
         the number of points.
@@ -78,6 +83,8 @@ def add_dimensions(
         with unchanged(state):
             cloud = read(source)
             arrays = checked(values(cloud.xyz), dimensions, len(cloud))
+        if classify is not None:
+            cloud = replace(cloud, classification=classify(arrays, cloud.classification))
         write_cloud(target, cloud, dimensions, arrays, 0.001)
         return len(cloud)
     with unchanged(state):
@@ -89,7 +96,10 @@ def add_dimensions(
                 channels.update(np.unique(records["scanner_channel"]).tolist())
                 _check_channels(source, channels, writer.header.are_points_compressed)
             arrays = checked(values(coordinates(records)), dimensions, len(records))
-            writer.write_points(_widened(records, writer.header, arrays))
+            points = _widened(records, writer.header, arrays)
+            if classify is not None:
+                points["classification"] = classify(arrays, np.asarray(points["classification"]))
+            writer.write_points(points)
         _write_evlrs(writer, header)
     return header.las.point_count
 

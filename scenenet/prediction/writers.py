@@ -1,12 +1,11 @@
-"""Files of a prediction: the classified survey (LAZ), the tower list (GeoJSON), the summary."""
+"""Files of a prediction: the classified survey (LAZ), the tower list, the summary."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,17 +15,16 @@ from scenenet.core.outputs import Output, check_space
 from scenenet.core.provenance import fingerprint
 from scenenet.core.scratch import temporary_directory
 from scenenet.detection.settings import DetectionSettings
-from scenenet.detection.survey_tower import SurveyTower
 from scenenet.pointcloud import add_dimensions
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
-
-if TYPE_CHECKING:
-    import pyproj
+from scenenet.prediction.tower_lists import write_csv, write_geojson, write_geopackage
 
 PROBABILITY = "tower_probability"
 TOWER_ID = "tower_id"
+TOWER_CODE = 15
+"""Class code of a tower in the schemes asprs and edp."""
 SHARE_PREFIX = "share_"
 
 
@@ -41,26 +39,30 @@ class PredictionFiles:
 
     Attributes:
         points: the survey with the dimensions of ``point_dimensions`` (LAZ).
-        towers: the tower list (GeoJSON).
+        geopackage, geojson, table: the tower list (``scenenet.prediction.tower_lists``).
         summary: ``PredictionSummary`` (JSON).
     """
 
     points: Path
-    towers: Path
+    geopackage: Path
+    geojson: Path
+    table: Path
     summary: Path
 
     @classmethod
     def of(cls, survey: Path, folder: Path) -> PredictionFiles:
         """The files that the command line writes for a survey; ``.copc`` is not part of a name."""
-        points = folder / f"{survey.stem.removesuffix('.copc')}.laz"
-        return cls(
-            points, points.with_suffix(".towers.geojson"), points.with_suffix(".summary.json")
-        )
+        stem = survey.stem.removesuffix(".copc")
+        endings = (".laz", ".gpkg", ".towers.geojson", ".towers.csv", ".summary.json")
+        return cls(*(folder / f"{stem}{ending}" for ending in endings))
+
+    @classmethod
+    def names(cls) -> list[str]:
+        """Names of the files."""
+        return [field.name for field in fields(cls)]
 
     def outputs(self, survey: Path) -> list[Output]:
-        return [
-            Output(path, self.is_own, survey) for path in (self.points, self.towers, self.summary)
-        ]
+        return [Output(getattr(self, name), self.is_own, survey) for name in self.names()]
 
     def is_own(self, path: Path) -> bool:
         """Whether ``path`` is as an earlier prediction wrote it; its summary is the record."""
@@ -112,19 +114,35 @@ def predict_to_files(
     with (
         predict_survey(survey, model, settings, detection) as prediction,
         atomic(files.points) as points,
-        atomic(files.towers) as towers,
+        atomic(files.geopackage) as geopackage,
+        atomic(files.geojson) as geojson,
+        atomic(files.table) as table,
         atomic(files.summary) as record,
     ):
         warn(survey, prediction.warnings)
         write_points(prediction, points)
-        write_json(towers, tower_collection(prediction.towers, prediction.crs))
-        outputs = {
-            files.points.name: fingerprint(points),
-            files.towers.name: fingerprint(towers),
-        }
+        write_towers(prediction, geopackage, geojson, table)
+        written = (points, geopackage, geojson, table)
+        outputs = {path.name: fingerprint(path) for path in written}
         summary = summarise(prediction, outputs)
         write_json(record, summary.to_json())
     return summary
+
+
+def write_towers(
+    prediction: SurveyPrediction, geopackage: Path, geojson: Path, table: Path
+) -> None:
+    """Write the tower list in each of its formats."""
+    towers, geneos, crs = prediction.towers, prediction.geneos, prediction.crs
+    status = {
+        "file": prediction.survey.name,
+        "points": prediction.n_points,
+        "towers": len(towers),
+        "status": "predicted",
+    }
+    write_geopackage(geopackage, towers, geneos, crs, prediction.tiles.spool, status)
+    write_geojson(geojson, towers, crs)
+    write_csv(table, towers, geneos)
 
 
 def point_dimensions(geneos: Iterable[str]) -> dict[str, tuple[type, str]]:
@@ -150,19 +168,16 @@ def write_points(prediction: SurveyPrediction, out: str | Path) -> None:
         named = {f"{SHARE_PREFIX}{geneo}": share for geneo, share in shares}
         return {PROBABILITY: points.probability, TOWER_ID: points.tower_id} | named
 
+    def classify(dimensions: Mapping[str, np.ndarray], codes: np.ndarray) -> np.ndarray:
+        chosen = prediction.settings.classify_from
+        tower = dimensions[TOWER_ID] > 0
+        if chosen is not None:
+            tower &= np.isin(codes, chosen)
+        return np.where(tower, TOWER_CODE, codes).astype(codes.dtype)
+
     dimensions = point_dimensions(prediction.geneos)
-    add_dimensions(prediction.survey, out, dimensions, values, prediction.state)
-
-
-def tower_collection(towers: Iterable[SurveyTower], crs: pyproj.CRS | None) -> dict[str, Any]:
-    """The tower list as a GeoJSON feature collection in the CRS of the survey."""
-    features = [tower.to_feature() for tower in towers]
-    collection: dict[str, Any] = {"type": "FeatureCollection", "features": features}
-    if crs is not None:
-        epsg = crs.to_epsg()
-        crs_name = f"urn:ogc:def:crs:EPSG::{epsg}" if epsg else crs.to_string()
-        collection["crs"] = {"type": "name", "properties": {"name": crs_name}}
-    return collection
+    reclassify = classify if prediction.settings.classify else None
+    add_dimensions(prediction.survey, out, dimensions, values, prediction.state, reclassify)
 
 
 def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> PredictionSummary:

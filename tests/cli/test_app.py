@@ -120,7 +120,10 @@ def test_predict_writes_the_three_files_of_a_survey(survey, model, tmp_path):
     done = scenenet("predict", survey, "--model", model, "--out", tmp_path, "--json")
     assert done.returncode == 0, done.stderr
     names = {f.name for f in tmp_path.iterdir()}
-    assert names == {"corridor.laz", "corridor.towers.geojson", "corridor.summary.json"}
+    assert names == {
+        "corridor.laz", "corridor.gpkg", "corridor.towers.csv", "corridor.towers.geojson",
+        "corridor.summary.json",
+    }  # fmt: skip
     summary = json.loads((tmp_path / "corridor.summary.json").read_text())
     assert json.loads(done.stdout) == [summary]
 

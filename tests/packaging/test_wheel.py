@@ -17,6 +17,8 @@ import pytest
 pytestmark = pytest.mark.packaging
 
 LIMIT_S = 600
+ENDINGS = ("laz", "gpkg", "towers.csv", "towers.geojson", "summary.json")
+"""Of the files of a prediction."""
 NOT_IN_THE_CORE = ("matplotlib", "mlflow", "snakemake")
 """Distributions that only extras bring; jinja2 and pygments come with torch and rich."""
 
@@ -127,12 +129,18 @@ def test_version_prints_the_version(installed: Installed, project_root: Path):
 
 def test_a_survey_is_predicted_and_checked(installed: Installed, predicted: Path):
     found = {path.name for path in predicted.iterdir()}
-    assert found == {"line.laz", "line.towers.geojson", "line.summary.json"}
+    assert found == {f"line.{ending}" for ending in ENDINGS}
     summary = json.loads((predicted / "line.summary.json").read_text())
     checked = installed.scenenet("check", "found/line.laz", "--codes", "edp", "--json")
     report = json.loads(checked.stdout)[0]
     assert report["n_points"] == summary["points"] > 10_000
     assert "tower_probability" in report["extra_dimensions"]
+
+
+def test_the_model_of_the_package_finds_the_towers(installed: Installed, predicted: Path):
+    installed.scenenet("predict", "line.laz", "--out", "packaged")
+    towers = json.loads((installed.folder / "packaged" / "line.towers.geojson").read_text())
+    assert len(towers["features"]) == 4
 
 
 def test_a_model_is_scored(installed: Installed, predicted: Path):

@@ -61,16 +61,11 @@ def predict(
     **settings,
 ) -> Prediction:
     folder.mkdir(exist_ok=True)
-    laz, geojson, summary = (folder / n for n in ("out.laz", "towers.geojson", "summary.json"))
-    returned = predict_to_files(
-        survey,
-        model,
-        PredictionFiles(laz, geojson, summary),
-        PredictSettings(**settings),
-        detection,
-    ).to_json()
-    assert json.loads(summary.read_text()) == returned
-    return Prediction(laz, json.loads(geojson.read_text()), returned)
+    files = PredictionFiles.of(Path("out.laz"), folder)
+    predict_with = PredictSettings(**settings)
+    returned = predict_to_files(survey, model, files, predict_with, detection).to_json()
+    assert json.loads(files.summary.read_text()) == returned
+    return Prediction(files.points, json.loads(files.geojson.read_text()), returned)
 
 
 def equal_field_by_field(before: laspy.LasData, after: laspy.LasData) -> None:
@@ -124,17 +119,19 @@ def test_only_the_predictions_are_added(survey, predicted):
 def test_the_tower_is_listed_where_it_stands(predicted):
     [tower] = predicted.towers["features"]
     assert tower["geometry"]["type"] == "Point"
-    assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.5)
     properties = tower["properties"]
+    assert (properties["x"], properties["y"]) == pytest.approx(POLE, abs=0.5)
     assert properties["id"] == 1
     assert properties["height"] == pytest.approx(14.0, abs=1.0)
-    assert properties["base_elevation"] == pytest.approx(100.0, abs=1.0)
+    assert properties["base"] == pytest.approx(100.0, abs=1.0)
     assert 0.7 <= properties["probability"] <= 1.0
     assert properties["edge_distance"] == pytest.approx(20.5, abs=2.0)
     assert set(properties["contributions"]) == {"cylinder", "arrow", "negative_sphere"}
     assert sum(map(abs, properties["contributions"].values())) == pytest.approx(1.0, abs=0.05)
-    crs = predicted.towers["crs"]["properties"]["name"]
-    assert crs == "urn:ogc:def:crs:EPSG::32629"
+    assert set(predicted.towers) == {"type", "features"}
+    place = pyproj.Transformer.from_crs(32629, 4326, always_xy=True).transform(*POLE)
+    assert tower["geometry"]["coordinates"][:2] == pytest.approx(place, abs=1e-5)
+    assert tower["geometry"]["coordinates"][2] == properties["base"]
 
 
 def test_conductors_are_listed_and_a_lone_pole_is_not_a_tower(scene, model, tmp_path):
@@ -149,7 +146,7 @@ def test_conductors_are_listed_and_a_lone_pole_is_not_a_tower(scene, model, tmp_
     write_las(tmp_path / "line.laz", line)
     found = predict(tmp_path / "line.laz", model, tmp_path / "out", DetectionSettings())
     [tower] = found.towers["features"]
-    assert tower["geometry"]["coordinates"] == pytest.approx(POLE, abs=0.6)
+    assert tower["geometry"]["coordinates"][:2] == pytest.approx(POLE, abs=0.6)
     properties = tower["properties"]
     assert properties["conductor_directions"] == 2
     assert sorted(round(b) % 360 for b in properties["conductor_bearings"]) == [0, 180]
@@ -247,13 +244,13 @@ def test_towers_are_numbered_in_the_list_and_in_the_points(scene, model, tmp_pat
     cloud = scene([(15.5, 15.5), (75.5, 15.5), (135.5, 15.5)], size=(151.0, 31.0), tree=None)
     write_las(tmp_path / "line.laz", cloud)
     line = predict(tmp_path / "line.laz", model, tmp_path / "out")
-    places = {f["id"]: f["geometry"]["coordinates"] for f in line.towers["features"]}
+    assert line.towers["coordinates"] == "survey"  # it has no CRS, and none is invented
+    places = {f["id"]: f["geometry"]["coordinates"][:2] for f in line.towers["features"]}
     assert sorted(places) == [1, 2, 3]
     assert sorted(round(x - 500_000.5) for x, _ in places.values()) == [15, 75, 135]
     for number, (x, y) in places.items():
         mine = line.points["tower_id"] == number
         assert np.hypot(line.points.x[mine] - x, line.points.y[mine] - y).max() < 2
-    assert "crs" not in line.towers  # the survey has none, and none is invented
 
 
 def test_a_survey_without_points_gives_an_empty_list(model, tmp_path):
@@ -261,7 +258,6 @@ def test_a_survey_without_points_gives_an_empty_list(model, tmp_path):
     write_las(tmp_path / "empty.laz", nothing)
     empty = predict(tmp_path / "empty.laz", model, tmp_path / "out")
     assert empty.towers["features"] == []
-    assert empty.towers["crs"]["properties"]["name"] == "urn:ogc:def:crs:EPSG::32629"
     assert empty.summary["points"] == 0
     assert len(empty.points) == 0
     assert set(ADDED) <= set(empty.points.point_format.dimension_names)
@@ -348,7 +344,7 @@ def test_a_model_of_portuguese_poles_finds_the_dutch_tower(real_prediction, real
     labelled = survey.xyz[survey.is_tower]
     true = (labelled[:, :2].min(axis=0) + labelled[:, :2].max(axis=0)) / 2
     features = real_prediction.towers["features"]
-    apart = [np.hypot(*(np.array(f["geometry"]["coordinates"]) - true)) for f in features]
+    apart = [np.hypot(*(np.array(f["geometry"]["coordinates"][:2]) - true)) for f in features]
     nearest = features[int(np.argmin(apart))]
     assert min(apart) < 5.0
     assert nearest["properties"]["height"] == pytest.approx(DUTCH_TOWER_HEIGHT_M, abs=4.0)

@@ -9,6 +9,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import laspy
+import pyogrio
 import pytest
 from fixtures.output_reference import Described, described, description_of
 
@@ -47,6 +48,9 @@ def _names(path: Path) -> list[str]:
             return next(csv.reader(file, delimiter="\t" if path.suffix == ".tsv" else ","))
     if path.suffix == ".geojson":
         return [n for f in json.loads(path.read_text())["features"] for n in f["properties"]]
+    if path.suffix == ".gpkg":
+        layers = [name for name, kind in pyogrio.list_layers(path) if kind is not None]
+        return [n for layer in layers for n in pyogrio.read_info(path, layer=layer)["fields"]]
     if path.suffix == ".json":
         return list(json.loads(path.read_text()))
     if path.suffix == ".laz":

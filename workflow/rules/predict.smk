@@ -6,14 +6,16 @@ rule predict:
         survey=lambda w: source(w.survey),
         model=champion_file(settings.predict.model),
     output:
-        survey=f"{R}/predict/{{survey}}/{{survey}}.laz",
-        towers=in_report(
+        points=f"{R}/predict/{{survey}}/{{survey}}.laz",
+        geopackage=f"{R}/predict/{{survey}}/{{survey}}.gpkg",
+        geojson=in_report(
             f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
             "prediction-towers",
             "predictions",
             "Files",
             {"survey": "{survey}", "file": "Towers"},
         ),
+        table=f"{R}/predict/{{survey}}/{{survey}}.towers.csv",
         summary=in_report(
             f"{R}/predict/{{survey}}/{{survey}}.summary.json",
             "prediction-summary",

@@ -43,7 +43,7 @@ rule report:
         models=every("tune", "model"),
         certificates=every("certificate", "certificate"),
         checks=every("check", "report"),
-        towers=every("predict", "towers"),
+        towers=every("predict", "geojson"),
         summaries=every("predict", "summary"),
         records=every_record(),
         thesis=ancient(own_file(settings.thesis)),

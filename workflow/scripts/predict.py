@@ -12,11 +12,11 @@ def predict(job: _job.Job) -> None:
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
     survey = Path(job.input.survey)
-    require_space({survey: survey_in_metres(survey).n_points}, Path(job.output.survey))
+    require_space({survey: survey_in_metres(survey).n_points}, Path(job.output.points))
     predict_to_files(
         survey,
         job.input.model,
-        PredictionFiles(*map(Path, (job.output.survey, job.output.towers, job.output.summary))),
+        PredictionFiles(**{name: Path(job.output[name]) for name in PredictionFiles.names()}),
         PredictSettings(**job.settings),
         DetectionSettings(**job.identity["detection"]),
     )

@@ -18,7 +18,7 @@ from scenenet.cli.options import (
 )
 from scenenet.cli.output import show
 
-EXAMPLES = ("scenenet explain line.laz --model model.json --out towers.html",)
+EXAMPLES = ("scenenet explain line.laz --out towers.html",)
 
 
 def command(

@@ -19,7 +19,7 @@ from scenenet.cli.options import (
 from scenenet.cli.output import show
 
 EXAMPLES = (
-    "scenenet predict line.laz --model model.json --out predicted",
+    "scenenet predict line.laz --out predicted",
     "scenenet predict surveys/*.laz --model model.json --out predicted --json",
 )
 
@@ -35,17 +35,35 @@ def command(
         ),
     ] = None,
     min_conductor: MinConductor = None,
+    classify: Annotated[
+        bool,
+        typer.Option(
+            "--classify", help="Give the points of towers the class code 15 (schemes asprs, edp)."
+        ),
+    ] = False,
+    classify_from: Annotated[
+        str | None,
+        typer.Option(
+            metavar="CODES",
+            help="With --classify: the class codes that may become 15, such as 0,1,5.  [default: "
+            "every code]",
+        ),
+    ] = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Find the towers of surveys and classify every point.
 
-    Each survey NAME gives three files in the folder --out:
+    Each survey NAME gives these files in the folder --out:
 
     NAME.laz: all points of the survey, in order, each with the probability of a tower, the id of
     its tower (0 for none) and the share of each GENEO.
 
-    NAME.towers.geojson: the towers, with position, height, base elevation (m) and probability.
+    NAME.gpkg: the towers, the coverage and the file as layers, in the CRS of the survey, with
+    styles for QGIS.
+
+    NAME.towers.csv, NAME.towers.geojson: the towers, with position, height, base elevation (m) and
+    probability. GeoJSON is in longitude and latitude where the CRS is known.
 
     NAME.summary.json: counts, settings and time.
 
@@ -58,6 +76,9 @@ def command(
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
+    settings = PredictSettings(
+        voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
+    )
     files = [PredictionFiles.of(survey, out) for survey in surveys]
     outputs = [o for f, survey in zip(files, surveys, strict=True) for o in f.outputs(survey)]
     check_outputs(outputs, [*surveys, model], overwrite=overwrite)
@@ -68,7 +89,6 @@ def command(
 
         read_model(model)[1].threshold()
     require_space({survey: info.n_points for survey, info in seen.items()}, out)
-    settings = PredictSettings(voxel_size=voxel_size)
     detection = detection_settings(min_conductor)
     summaries = []
     for survey, target in zip(surveys, files, strict=True):
@@ -84,3 +104,18 @@ def command(
         ],
     )
     failures.end()
+
+
+def _codes(classify: bool, text: str | None) -> tuple[int, ...] | None:
+    """The class codes of ``--classify-from``."""
+    if text is None:
+        return None
+    if not classify:
+        raise typer.BadParameter("needs --classify", param_hint="--classify-from")
+    codes = [part.strip() for part in text.split(",")]
+    if not all(code.isdecimal() and int(code) < 256 for code in codes):
+        raise typer.BadParameter(
+            f"{text!r} is not a list of class codes from 0 to 255, such as 0,1,5",
+            param_hint="--classify-from",
+        )
+    return tuple(int(code) for code in codes)

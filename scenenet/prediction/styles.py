@@ -1,0 +1,59 @@
+"""How QGIS draws the layers of the GeoPackage."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+QML = """\
+<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>
+<qgis version="3.22" styleCategories="Symbology|Labeling">
+<renderer-v2 type="singleSymbol">
+<symbols><symbol name="0" type="{kind}" alpha="1">
+<layer class="{symbol}">{options}</layer>
+</symbol></symbols>
+</renderer-v2>
+{labels}</qgis>
+"""
+
+LABELS = """\
+<labeling type="simple"><settings>
+<text-style fieldName="{field}" isExpression="1" fontSize="9" textColor="30,30,30,255"/>
+<placement placement="0" dist="2"/>
+</settings></labeling>
+"""
+
+
+def _style(kind: str, symbol: str, labels: str = "", **options: str) -> str:
+    """A style of one symbol for all features of a layer."""
+    written = "".join(f'<prop k="{name}" v="{value}"/>' for name, value in options.items())
+    return QML.format(kind=kind, symbol=symbol, options=written, labels=labels)
+
+
+STYLES: Mapping[str, str] = {
+    "towers": _style(
+        "marker",
+        "SimpleMarker",
+        LABELS.format(field="'T' || &quot;id&quot;"),
+        name="triangle",
+        color="192,57,43,255",
+        outline_color="255,255,255,255",
+        size="3.4",
+    ),
+    "coverage": _style(
+        "fill",
+        "SimpleFill",
+        color="52,110,140,40",
+        outline_color="52,110,140,255",
+        outline_width="0.2",
+        style="solid",
+    ),
+    "tiles": _style(
+        "fill",
+        "SimpleFill",
+        color="0,0,0,0",
+        outline_color="90,90,90,255",
+        outline_style="dash",
+        style="no",
+    ),
+}
+"""Layer -> style in the language of QGIS."""

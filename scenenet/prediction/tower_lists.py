@@ -1,0 +1,178 @@
+"""The tower list as files: CSV, GeoPackage, and GeoJSON for maps on the web."""
+
+from __future__ import annotations
+
+import csv
+import sqlite3
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scenenet.core.files import write_json
+from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower
+from scenenet.prediction.styles import STYLES
+from scenenet.prediction.tiling import TileSpool
+
+if TYPE_CHECKING:
+    import pyproj
+
+LONGITUDE_LATITUDE = 4326
+"""EPSG code of the coordinates of GeoJSON (RFC 7946)."""
+
+WRITTEN = "1970-01-01T00:00:00.000Z"
+"""Time of writing in a GeoPackage: a fixed one, so that equal predictions give equal files."""
+
+COVERAGE_CELL = 8
+"""Voxels along the edge of the cells that make up the coverage."""
+
+
+def columns(geneos: Sequence[str]) -> list[str]:
+    """Columns of the CSV file and of the layer ``towers`` (``SurveyTower.to_row``)."""
+    names = [c.name for c in TOWER_COLUMNS if c.name != "contributions"]
+    return names + [f"contribution_{geneo}" for geneo in geneos]
+
+
+def write_csv(path: str | Path, towers: Iterable[SurveyTower], geneos: Sequence[str]) -> None:
+    """Write the tower list as CSV, with x and y in the coordinates of the survey."""
+    with Path(path).open("w", encoding="utf-8", newline="") as stream:
+        table = csv.DictWriter(stream, columns(geneos), lineterminator="\n")
+        table.writeheader()
+        table.writerows(tower.to_row() for tower in towers)
+
+
+def write_geojson(path: str | Path, towers: Sequence[SurveyTower], crs: pyproj.CRS | None) -> None:
+    """Write the tower list as GeoJSON.
+
+    The coordinates are longitude and latitude in degrees and the elevation of the foot in m, as RFC
+    7946 prescribes. Where the CRS is unknown they are those of the survey, and the member
+    ``coordinates`` of the collection is ``survey``. The properties ``x`` and ``y`` are always those
+    of the survey.
+    """
+    places = np.array([(tower.x, tower.y) for tower in towers]).reshape(-1, 2)
+    collection: dict[str, Any] = {"type": "FeatureCollection"}
+    if crs is None:
+        collection["coordinates"] = "survey"
+    elif len(towers):
+        from pyproj import Transformer
+
+        turned = Transformer.from_crs(crs.to_2d(), LONGITUDE_LATITUDE, always_xy=True)
+        places = np.column_stack(turned.transform(*places.T))
+    collection["features"] = [
+        tower.to_feature([*map(float, place), tower.base])
+        for tower, place in zip(towers, places, strict=True)
+    ]
+    write_json(path, collection)
+
+
+def write_geopackage(
+    path: str | Path,
+    towers: Sequence[SurveyTower],
+    geneos: Sequence[str],
+    crs: pyproj.CRS | None,
+    spool: TileSpool,
+    survey: Mapping[str, Any],
+) -> None:
+    """Write the tower list as a GeoPackage in the CRS of the survey, with styles for QGIS.
+
+    Its layers are ``towers`` (PointZ, at the foot, with the columns of the CSV file), ``coverage``
+    (the cells with a point) and ``tiles`` (the files of the survey, with their status).
+
+    Args:
+        path: ends in ``.gpkg``.
+        geneos: names of the GENEOs of the model.
+        crs: of the survey; None if it is not known.
+        spool: the occupied voxels of the survey.
+        survey: the attributes of its row in the layer ``tiles``.
+    """
+    import shapely
+
+    names = columns(geneos)
+    rows = [tower.to_row() for tower in towers]
+    fields = {name: _column([row[name] for row in rows], name) for name in names}
+    feet = np.array([(tower.x, tower.y, tower.base) for tower in towers]).reshape(-1, 3)
+    covered = coverage(spool)
+    parts = shapely.get_parts(covered)
+    whole = {name: np.array([value]) for name, value in survey.items()}
+    _write_layer(path, "towers", "Point Z", shapely.points(feet), fields, crs)
+    _write_layer(path, "coverage", "Polygon", parts, {"area_m2": shapely.area(parts)}, crs)
+    extent = shapely.Polygon() if covered.is_empty else shapely.box(*covered.bounds)
+    _write_layer(path, "tiles", "Polygon", [extent], whole, crs)
+    _add_styles(path)
+
+
+def coverage(spool: TileSpool) -> Any:
+    """The cells of ``COVERAGE_CELL`` voxels that hold a point, as one shapely geometry."""
+    import shapely
+
+    cells: set[tuple[int, int]] = set()
+    for tile in spool.tiles():
+        held = np.unique(tile.zyx()[:, 1:] // COVERAGE_CELL, axis=0)
+        cells.update(map(tuple, held.tolist()))
+    if not cells:
+        return shapely.Polygon()
+    steps = np.array(sorted(cells))[:, ::-1]
+    # Neighbours share their corners exactly: both are products of the same numbers.
+    low, high = ((steps + shift) * (COVERAGE_CELL * spool.voxel_size) for shift in (0, 1))
+    return shapely.union_all(shapely.box(*low.T, *high.T))
+
+
+def _column(values: list[Any], name: str) -> np.ndarray:
+    """The values of a column, with the type that it has where the list is empty, too."""
+    kinds = {"id": np.int64, "conductor_directions": np.int64, "points": np.int64}
+    if name == "conductor_bearings":
+        return np.array(values, dtype=object)
+    return np.array(values, dtype=kinds.get(name, np.float64))
+
+
+def _write_layer(
+    path: str | Path,
+    name: str,
+    kind: str,
+    geometry: Any,
+    fields: Mapping[str, np.ndarray],
+    crs: pyproj.CRS | None,
+) -> None:
+    import shapely
+    from pyogrio import set_gdal_config_options
+    from pyogrio.raw import write
+
+    set_gdal_config_options({"OGR_CURRENT_DATE": WRITTEN})
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "'crs' was not provided")  # the survey has none
+        write(
+            path,
+            layer=name,
+            driver="GPKG",
+            geometry=shapely.to_wkb(np.asarray(geometry, object), output_dimension=3),
+            geometry_type=kind,
+            field_data=list(fields.values()),
+            fields=list(fields),
+            crs=None if crs is None else crs.to_2d().to_wkt(),
+            append=Path(path).exists(),
+        )
+
+
+def _add_styles(path: str | Path) -> None:
+    """Add the table from which QGIS takes the styles of the layers."""
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute(
+            "CREATE TABLE layer_styles (id INTEGER PRIMARY KEY, f_table_catalog TEXT, "
+            "f_table_schema TEXT, f_table_name TEXT, f_geometry_column TEXT, styleName TEXT, "
+            "styleQML TEXT, styleSLD TEXT, useAsDefault BOOLEAN, description TEXT, owner TEXT, "
+            "ui TEXT, update_time DATETIME DEFAULT CURRENT_TIMESTAMP)"
+        )
+        database.execute(
+            "INSERT INTO gpkg_contents (table_name, data_type, identifier, last_change) "
+            "VALUES ('layer_styles', 'attributes', 'layer_styles', ?)",
+            [WRITTEN],
+        )
+        database.executemany(
+            "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
+            "f_geometry_column, styleName, styleQML, styleSLD, useAsDefault, update_time) "
+            "VALUES ('', '', ?, 'geom', ?, ?, '', 1, ?)",
+            [(layer, layer, style, WRITTEN) for layer, style in STYLES.items()],
+        )

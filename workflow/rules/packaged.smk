@@ -1,0 +1,38 @@
+"""The model that comes with the package: the best seed of the model that predicts, with its card."""
+
+packaged = settings.model_named(settings.predict.model)
+
+if packaged.kind == "scenenet" and packaged.protocol == "operational":
+
+    rule packaged_model:
+        input:
+            model=champion_file(packaged.name),
+            scores=every("evaluate", "scores", model=packaged.name),
+            tunings=every("tune", "tuning", model=packaged.name),
+            histories=every("train", "history", model=packaged.name),
+            records=every("train", "provenance", model=packaged.name),
+            split=every("split", "split"),
+        output:
+            model=f"{R}/packaged/towers.json",
+            card=f"{R}/packaged/towers.md",
+            provenance=f"{R}/packaged/provenance.json",
+        log:
+            f"{R}/logs/packaged_model.log",
+        benchmark:
+            f"{R}/benchmarks/packaged_model.tsv"
+        conda:
+            "../envs/scenenet.yaml"
+        threads: 1
+        resources:
+            mem_mb=1000,
+            runtime=10,
+        params:
+            job=job(
+                "packaged_model",
+                {},
+                results=results_of(models=[packaged], predicts=packaged.name),
+            ),
+        message:
+            "Writing the model that comes with the package, and its card"
+        script:
+            "../scripts/packaged_model.py"

@@ -43,7 +43,10 @@ else:
 
 Survey = Annotated[Path, typer.Argument(help="LAS, LAZ or COPC survey, or TS40K sample.")]
 Surveys = Annotated[
-    list[Path], typer.Argument(help="LAS, LAZ or COPC surveys, or TS40K samples (.npy, .pt).")
+    list[Path],
+    typer.Argument(
+        help="LAS, LAZ or COPC surveys, folders or patterns of tiles, or TS40K samples (.npy, .pt)."
+    ),
 ]
 Labelled = Annotated[
     list[Path],

@@ -96,7 +96,7 @@ def score_survey(
     true_places = None if survey.true_towers is None else TowerPlaces(survey.true_towers)
     settings = PredictSettings()
     with predict_survey(survey.path, model, settings, detection) as prediction:
-        files = (prediction.state, *(() if survey.truth is None else (survey.truth,)))
+        files = (*prediction.states, *(() if survey.truth is None else (survey.truth,)))
         with unchanged(*files), in_file(survey.path):
             chunks = iter_chunks(survey.path, survey.codes, settings.chunk_points, survey.truth)
             for chunk in track(chunks, f"{survey.path.name}: points scored"):

@@ -11,16 +11,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenenet.core.errors import in_file
+from scenenet.core.errors import InputError, OutputError, in_file, warn
 from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
 from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.unchanged import FileState, unchanged
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
-from scenenet.pointcloud import iter_chunks, survey_in_metres
+from scenenet.pointcloud import iter_chunks
 from scenenet.pointcloud.quality.screening import Screening
+from scenenet.pointcloud.reading import SurveyInfo
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.survey_files import (
+    SurveyFile,
+    SurveyFiles,
+    look_at,
+    nothing_to_use,
+    readable,
+)
 from scenenet.prediction.tile_predictions import PointPredictions, TilePredictions
 from scenenet.prediction.tiling import TileSpool
 
@@ -41,33 +49,50 @@ class SurveyPrediction:
     """The predictions of a model for a survey.
 
     Attributes:
-        survey: the file of the survey.
-        state: its state before the first pass; a later pass must find the same.
-        warnings: what looks wrong about it, as sentences.
+        survey: its files, as they were named.
+        files: its files, as they were read.
         model, card: the model and what its file says about it.
         settings, detection: the settings of the prediction.
-        crs: CRS of the survey; None where the file names none.
-        n_points, n_tiles: points of the survey, and tiles that hold a point.
+        crs: CRS of the survey; None where its files name none.
+        n_tiles: tiles of voxels that hold a point.
         voxel_size: m.
         towers: the towers found, highest probability first.
         tiles: the predictions on disk; they exist inside the ``with`` block of ``predict_survey``.
         started: ``time.perf_counter()`` at the start.
     """
 
-    survey: Path
-    state: FileState
-    warnings: tuple[str, ...]
+    survey: SurveyFiles
+    files: tuple[SurveyFile, ...]
     model: VoxelModel
     card: ModelCard
     settings: PredictSettings
     detection: DetectionSettings
     crs: pyproj.CRS | None
-    n_points: int
     n_tiles: int
     voxel_size: float
     towers: tuple[SurveyTower, ...]
     tiles: TilePredictions
     started: float
+
+    @property
+    def n_points(self) -> int:
+        """Points of the survey."""
+        return sum(file.n_points for file in self.files)
+
+    @property
+    def states(self) -> tuple[FileState, ...]:
+        """The states of the files that were read."""
+        return tuple(state for _, state in readable(self.files))
+
+    def warn(self) -> None:
+        """Print what looks wrong about the files; what is wrong with several of them, once."""
+        found: dict[str, list[Path]] = {}
+        for file in self.files:
+            for text in file.warnings:
+                found.setdefault(text, []).append(file.path)
+        for text, paths in found.items():
+            others = f" (and {len(paths) - 1} more files)" if len(paths) > 1 else ""
+            warn(f"{paths[0]}{others}", [text])
 
     @property
     def geneos(self) -> tuple[str, ...]:
@@ -81,15 +106,16 @@ class SurveyPrediction:
 
 @contextmanager
 def predict_survey(
-    survey: str | Path,
+    survey: str | Path | SurveyFiles,
     model: str | Path,
     settings: PredictSettings,
     detection: DetectionSettings,
 ) -> Iterator[SurveyPrediction]:
     """Predict every occupied voxel of a survey and find its towers.
 
-    Memory is bounded by a chunk of points and a tile of voxels. The predictions lie in a temporary
-    folder, which is removed at the end of the ``with`` block::
+    All files of a survey are read before towers are searched for, so the result does not depend on
+    where the survey was cut. Memory is bounded by a chunk of points and a tile of voxels. The
+    predictions lie in a temporary folder, which is removed at the end of the ``with`` block::
 
         with predict_survey("line.laz", "model.json", PredictSettings(), DetectionSettings()) as p:
             print(p.towers, p.look_up(xyz).probability)
@@ -97,7 +123,8 @@ def predict_survey(
     ``scenenet.prediction.writers`` writes a prediction to files.
 
     Args:
-        survey: LAS, LAZ, COPC or TS40K sample.
+        survey: LAS, LAZ, COPC or TS40K sample; a folder or a pattern of LAS and LAZ files. Of a
+            folder or pattern, a file that cannot be used is left out, with its error in ``files``.
         model: model file with tau.
 
     Raises:
@@ -108,32 +135,26 @@ def predict_survey(
     from scenenet.models.model_file import read_model
 
     started = time.perf_counter()
+    if not isinstance(survey, SurveyFiles):
+        survey = SurveyFiles.of(survey)
     trained, card = read_model(model)
     tau = card.threshold()  # fail before the work: without tau there is no tower
     geneos = trained.names if isinstance(trained, GeneoModel) else []
     voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
-    state = FileState.of(survey)
-    name, info = Path(survey).name, survey_in_metres(survey)
-    check_space({temporary_directory(): SCRATCH_BYTES * info.n_points})
-    screening = Screening(info)
     with scratch_folder() as scratch:
         spool = TileSpool(scratch, voxel_size)
-        with unchanged(state), in_file(survey):
-            n_points = _read(survey, spool, screening, settings.chunk_points)
-        screening.raise_if_not_metres()
+        files, crs = read_files(survey, spool, settings.chunk_points)
         tiles = TilePredictions(spool, scratch, geneos)
-        tiles.compute(trained, card, f"{name}: tiles predicted")
+        tiles.compute(trained, card, f"{survey.given.name}: tiles predicted")
         towers = tuple(tiles.find_towers(tau, detection))
         yield SurveyPrediction(
-            survey=Path(survey),
-            state=state,
-            warnings=screening.warnings(),
+            survey=survey,
+            files=files,
             model=trained,
             card=card,
             settings=settings,
             detection=detection,
-            crs=info.crs,
-            n_points=n_points,
+            crs=crs,
             n_tiles=len(spool),
             voxel_size=voxel_size,
             towers=towers,
@@ -142,12 +163,45 @@ def predict_survey(
         )
 
 
-def _read(survey: str | Path, spool: TileSpool, screening: Screening, chunk_points: int) -> int:
-    """Read a survey into ``spool`` and ``screening``; the number of its points."""
-    n_points = 0
-    chunks = iter_chunks(survey, chunk_points=chunk_points)
-    for chunk in track(chunks, f"{Path(survey).name}: chunks read"):
-        screening.add(chunk.xyz, chunk.classification)
-        spool.add(chunk.xyz)
-        n_points += len(chunk)
-    return n_points
+def read_files(
+    survey: SurveyFiles, spool: TileSpool, chunk_points: int
+) -> tuple[tuple[SurveyFile, ...], pyproj.CRS | None]:
+    """Read all files of a survey into ``spool``.
+
+    Returns:
+        the files, and the CRS of the first one that could be read.
+
+    Raises:
+        InputError: no file can be used, or, of a survey that is one file, that one.
+    """
+    headers, errors = look_at(survey)
+    check_space({temporary_directory(): SCRATCH_BYTES * sum(i.n_points for i in headers.values())})
+    files = []
+    for path in survey.files:
+        try:
+            if path in errors:
+                raise errors[path]
+            files.append(_read(path, headers[path], spool, chunk_points))
+        except OutputError:
+            raise
+        except InputError as error:
+            if not survey.tiled:
+                raise
+            files.append(SurveyFile(path, error=error))
+    if not any(readable(files)):
+        raise nothing_to_use(survey, [file.error for file in files if file.error is not None])
+    return tuple(files), next(iter(headers.values())).crs
+
+
+def _read(path: Path, info: SurveyInfo, spool: TileSpool, chunk_points: int) -> SurveyFile:
+    """Read a file into ``spool``, and look at it."""
+    screening, n_points, state = Screening(info), 0, FileState.of(path)
+    with unchanged(state), in_file(path):
+        chunks = iter_chunks(path, chunk_points=chunk_points)
+        for chunk in track(chunks, f"{path.name}: chunks read"):
+            screening.add(chunk.xyz, chunk.classification)
+            spool.add(chunk.xyz)
+            n_points += len(chunk)
+    screening.raise_if_not_metres()
+    extent = (*screening.mins[:2].tolist(), *screening.maxs[:2].tolist()) if n_points else None
+    return SurveyFile(path, state, n_points, extent, warnings=screening.warnings())

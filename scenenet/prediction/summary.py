@@ -25,10 +25,12 @@ class PredictionSummary:
         tiles: number of tiles that hold a point.
         crs: CRS of the survey; None where the file names none.
         warnings: what looks wrong about the survey, as sentences.
+        files: of each file name, status (``predicted`` or ``failed``), points, points with a tower
+            id, and error.
         seconds: time of the prediction, files included, s.
         settings: settings of the prediction, with those of ``detection``.
         model_provenance: provenance of the model.
-        outputs: name -> fingerprint of the classified points and of the tower list. A later
+        outputs: path -> fingerprint of the classified points and of the tower lists. A later
             prediction replaces these files only if they are unchanged.
     """
 
@@ -42,6 +44,7 @@ class PredictionSummary:
     tiles: int
     crs: str | None
     warnings: list[str]
+    files: list[dict[str, Any]]
     seconds: float
     settings: dict[str, Any]
     model_provenance: dict[str, Any]

@@ -15,6 +15,7 @@ import numpy as np
 from scenenet.core.files import write_json
 from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower
 from scenenet.prediction.styles import STYLES
+from scenenet.prediction.survey_files import SurveyFile
 from scenenet.prediction.tiling import TileSpool
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def write_geopackage(
     geneos: Sequence[str],
     crs: pyproj.CRS | None,
     spool: TileSpool,
-    survey: Mapping[str, Any],
+    files: Sequence[SurveyFile],
 ) -> None:
     """Write the tower list as a GeoPackage in the CRS of the survey, with styles for QGIS.
 
@@ -86,7 +87,7 @@ def write_geopackage(
         geneos: names of the GENEOs of the model.
         crs: of the survey; None if it is not known.
         spool: the occupied voxels of the survey.
-        survey: the attributes of its row in the layer ``tiles``.
+        files: of the survey, a row each in the layer ``tiles``.
     """
     import shapely
 
@@ -96,11 +97,12 @@ def write_geopackage(
     feet = np.array([(tower.x, tower.y, tower.base) for tower in towers]).reshape(-1, 3)
     covered = coverage(spool)
     parts = shapely.get_parts(covered)
-    whole = {name: np.array([value]) for name, value in survey.items()}
+    extents = [shapely.Polygon() if f.extent is None else shapely.box(*f.extent) for f in files]
+    facts = [file.to_json() for file in files]
+    told = {name: np.array([row[name] for row in facts]) for name in facts[0]}
     _write_layer(path, "towers", "Point Z", shapely.points(feet), fields, crs)
     _write_layer(path, "coverage", "Polygon", parts, {"area_m2": shapely.area(parts)}, crs)
-    extent = shapely.Polygon() if covered.is_empty else shapely.box(*covered.bounds)
-    _write_layer(path, "tiles", "Polygon", [extent], whole, crs)
+    _write_layer(path, "tiles", "Polygon", extents, told, crs)
     _add_styles(path)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from scenenet.core.errors import InputError, warn
+from scenenet.core.errors import InputError, OutputError
 from scenenet.core.files import atomic, read_json, write_json
 from scenenet.core.outputs import Output, check_space
 from scenenet.core.provenance import fingerprint
@@ -19,6 +20,7 @@ from scenenet.pointcloud import add_dimensions
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
+from scenenet.prediction.survey_files import SurveyFile, SurveyFiles, result_stem
 from scenenet.prediction.tower_lists import write_csv, write_geojson, write_geopackage
 
 PROBABILITY = "tower_probability"
@@ -38,61 +40,84 @@ class PredictionFiles:
     """The files of a prediction.
 
     Attributes:
-        points: the survey with the dimensions of ``point_dimensions`` (LAZ).
+        points: file of the survey -> the same points with the dimensions of ``point_dimensions``
+            (LAZ).
         geopackage, geojson, table: the tower list (``scenenet.prediction.tower_lists``).
         summary: ``PredictionSummary`` (JSON).
     """
 
-    points: Path
+    points: Mapping[Path, Path]
     geopackage: Path
     geojson: Path
     table: Path
     summary: Path
 
     @classmethod
-    def of(cls, survey: Path, folder: Path) -> PredictionFiles:
-        """The files that the command line writes for a survey; ``.copc`` is not part of a name."""
-        stem = survey.stem.removesuffix(".copc")
-        endings = (".laz", ".gpkg", ".towers.geojson", ".towers.csv", ".summary.json")
-        return cls(*(folder / f"{stem}{ending}" for ending in endings))
+    def of(cls, survey: SurveyFiles | Path, folder: Path) -> PredictionFiles:
+        """The files that the command line writes for a survey. The points of one with several files
+        are in a folder with its name."""
+        if not isinstance(survey, SurveyFiles):
+            survey = SurveyFiles.of(survey)
+        place = folder / survey.name if survey.tiled else folder
+        points = {path: place / f"{result_stem(path)}.laz" for path in survey.files}
+        endings = (".gpkg", ".towers.geojson", ".towers.csv", ".summary.json")
+        return cls(points, *(folder / f"{survey.name}{ending}" for ending in endings))
 
-    @classmethod
-    def names(cls) -> list[str]:
-        """Names of the files."""
-        return [field.name for field in fields(cls)]
+    @property
+    def lists(self) -> tuple[Path, Path, Path]:
+        """The files of the tower list."""
+        return self.geopackage, self.geojson, self.table
 
-    def outputs(self, survey: Path) -> list[Output]:
-        return [Output(getattr(self, name), self.is_own, survey) for name in self.names()]
+    def outputs(self) -> list[Output]:
+        lists = [Output(path, self.is_own) for path in (*self.lists, self.summary)]
+        return [Output(path, self.is_own, file) for file, path in self.points.items()] + lists
 
     def is_own(self, path: Path) -> bool:
-        """Whether ``path`` is as an earlier prediction wrote it; its summary is the record."""
+        """Whether ``path`` is as an earlier prediction wrote it; its summary is the record, and
+        until that is written, the record of the points."""
         try:
-            written = read_json(self.summary)["outputs"]
             if path == self.summary:
-                return isinstance(written, dict)
-            return bool(fingerprint(path) == written[path.name])
+                return isinstance(read_json(self.summary)["outputs"], dict)
+            return bool(fingerprint(path) == self._recorded()[self.key(path)])
         except (InputError, KeyError, OSError, TypeError, ValueError):
             return False
 
+    def key(self, path: Path) -> str:
+        """Name of an output in the record: its path from the folder of the summary."""
+        return path.relative_to(self.summary.parent).as_posix()
 
-def require_space(surveys: Mapping[Path, int], out: Path) -> None:
+    @property
+    def unfinished(self) -> Path:
+        """Record of the points that were written, while the others are not."""
+        return self.summary.with_name(f".{self.summary.name}.unfinished")
+
+    def _recorded(self) -> dict[str, str]:
+        written: dict[str, str] = {}
+        if self.summary.exists():
+            written |= read_json(self.summary)["outputs"]
+        if self.unfinished.exists():
+            written |= read_json(self.unfinished)
+        return written
+
+
+def require_space(surveys: Iterable[Mapping[Path, int]], out: Path) -> None:
     """Check that the disks have room for all results, and for the temporary files of one survey.
 
     Args:
-        surveys: their files, with the number of points of each.
+        surveys: for each survey, its files with the number of points of each.
         out: folder of the results.
 
     Raises:
         OutputError: a disk has too little space.
     """
-    points = surveys.values()
-    results = sum(path.stat().st_size for path in surveys) + RESULT_BYTES * sum(points)
-    scratch = SCRATCH_BYTES * max(points, default=0)
+    sizes = [(path.stat().st_size, points) for files in surveys for path, points in files.items()]
+    results = sum(size + RESULT_BYTES * points for size, points in sizes)
+    scratch = SCRATCH_BYTES * max((sum(files.values()) for files in surveys), default=0)
     check_space({out: results, temporary_directory(): scratch})
 
 
 def predict_to_files(
-    survey: str | Path,
+    survey: str | Path | SurveyFiles,
     model: str | Path,
     files: PredictionFiles,
     settings: PredictSettings,
@@ -100,33 +125,60 @@ def predict_to_files(
 ) -> PredictionSummary:
     """Predict a survey and write the classified points, the tower list and the summary.
 
-    The survey is read twice: once for its occupied voxels, once to write every point back.
+    The survey is read twice: once for its occupied voxels, once to write every point back. Of a
+    survey that is one file, all results appear, or none. Of one with several files, each file
+    appears whole; one that fails stops no other and is named in the summary and in the layer
+    ``tiles``.
 
     Args:
-        survey: LAS, LAZ, COPC or TS40K sample.
+        survey: LAS, LAZ, COPC or TS40K sample; a folder or a pattern of LAS and LAZ files.
         model: model file with tau.
-        files: to write; all of them appear, or none.
+        files: to write.
 
     Raises:
         InputError: the survey or the model cannot be used.
         OutputError: a file cannot be written.
     """
-    with (
-        predict_survey(survey, model, settings, detection) as prediction,
-        atomic(files.points) as points,
-        atomic(files.geopackage) as geopackage,
-        atomic(files.geojson) as geojson,
-        atomic(files.table) as table,
-        atomic(files.summary) as record,
-    ):
-        warn(survey, prediction.warnings)
-        write_points(prediction, points)
-        write_towers(prediction, geopackage, geojson, table)
-        written = (points, geopackage, geojson, table)
-        outputs = {path.name: fingerprint(path) for path in written}
-        summary = summarise(prediction, outputs)
+    with predict_survey(survey, model, settings, detection) as prediction, ExitStack() as stack:
+        prediction.warn()
+        written: dict[str, str] = {}
+        if prediction.survey.tiled:
+            read = _write_tiles(prediction, files, written)
+        else:
+            [(path, target)] = files.points.items()
+            partial = stack.enter_context(atomic(target))
+            read = (write_points(prediction, path, partial),)
+            written[files.key(target)] = fingerprint(partial)
+        lists = [stack.enter_context(atomic(path)) for path in files.lists]
+        record = stack.enter_context(atomic(files.summary))
+        prediction = replace(prediction, files=read)
+        write_towers(prediction, *lists)
+        written |= {files.key(p): fingerprint(f) for p, f in zip(files.lists, lists, strict=True)}
+        summary = summarise(prediction, written)
         write_json(record, summary.to_json())
+    files.unfinished.unlink(missing_ok=True)
     return summary
+
+
+def _write_tiles(
+    prediction: SurveyPrediction, files: PredictionFiles, written: dict[str, str]
+) -> tuple[SurveyFile, ...]:
+    """Write the points of each file that was read, and the fingerprint of each into ``written``."""
+    read = []
+    for file in prediction.files:
+        target = files.points[file.path]
+        if file.error is None:
+            try:
+                with atomic(target) as partial:
+                    file = write_points(prediction, file.path, partial)
+                    written[files.key(target)] = fingerprint(partial)
+                write_json(files.unfinished, written)
+            except OutputError:
+                raise
+            except InputError as error:
+                file = replace(file, error=error)
+        read.append(file)
+    return tuple(read)
 
 
 def write_towers(
@@ -134,13 +186,7 @@ def write_towers(
 ) -> None:
     """Write the tower list in each of its formats."""
     towers, geneos, crs = prediction.towers, prediction.geneos, prediction.crs
-    status = {
-        "file": prediction.survey.name,
-        "points": prediction.n_points,
-        "towers": len(towers),
-        "status": "predicted",
-    }
-    write_geopackage(geopackage, towers, geneos, crs, prediction.tiles.spool, status)
+    write_geopackage(geopackage, towers, geneos, crs, prediction.tiles.spool, prediction.files)
     write_geojson(geojson, towers, crs)
     write_csv(table, towers, geneos)
 
@@ -155,21 +201,27 @@ def point_dimensions(geneos: Iterable[str]) -> dict[str, tuple[type, str]]:
     return dimensions | shares
 
 
-def write_points(prediction: SurveyPrediction, out: str | Path) -> None:
-    """Write every point of the survey back, in order, with ``point_dimensions`` added.
+def write_points(prediction: SurveyPrediction, path: Path, out: str | Path) -> SurveyFile:
+    """Write every point of a file back, in order, with ``point_dimensions`` added.
+
+    Returns:
+        the file, with the number of points that have a tower id.
 
     Raises:
-        InputError: the survey changed after it was read; ``out`` stays as it was.
+        InputError: the file changed after it was read; ``out`` stays as it was.
     """
+    [file] = [file for file in prediction.files if file.path == path]
+    chosen, in_tower = prediction.settings.classify_from, 0
 
     def values(xyz: np.ndarray) -> dict[str, np.ndarray]:
+        nonlocal in_tower
         points = prediction.look_up(xyz)
+        in_tower += int(np.count_nonzero(points.tower_id))
         shares = zip(prediction.geneos, points.shares.T, strict=True)
         named = {f"{SHARE_PREFIX}{geneo}": share for geneo, share in shares}
         return {PROBABILITY: points.probability, TOWER_ID: points.tower_id} | named
 
     def classify(dimensions: Mapping[str, np.ndarray], codes: np.ndarray) -> np.ndarray:
-        chosen = prediction.settings.classify_from
         tower = dimensions[TOWER_ID] > 0
         if chosen is not None:
             tower &= np.isin(codes, chosen)
@@ -177,7 +229,8 @@ def write_points(prediction: SurveyPrediction, out: str | Path) -> None:
 
     dimensions = point_dimensions(prediction.geneos)
     reclassify = classify if prediction.settings.classify else None
-    add_dimensions(prediction.survey, out, dimensions, values, prediction.state, reclassify)
+    add_dimensions(path, out, dimensions, values, file.state, reclassify)
+    return replace(file, tower_points=in_tower)
 
 
 def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> PredictionSummary:
@@ -185,7 +238,7 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
     detection = {"detection": prediction.detection.model_dump()}
     crs = prediction.crs
     return PredictionSummary(
-        survey=str(prediction.survey),
+        survey=str(prediction.survey.given),
         model=prediction.card.name,
         points=prediction.n_points,
         towers=len(prediction.towers),
@@ -194,7 +247,8 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         kernel_size=list(prediction.model.kernel_size),
         tiles=prediction.n_tiles,
         crs=None if crs is None else crs.to_string(),
-        warnings=list(prediction.warnings),
+        warnings=[text for file in prediction.files for text in file.warnings],
+        files=[file.to_json() for file in prediction.files],
         seconds=time.perf_counter() - prediction.started,
         settings=prediction.settings.model_dump() | detection,
         model_provenance=prediction.card.provenance,

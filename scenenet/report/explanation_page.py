@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from scenenet.core.errors import warn
 from scenenet.core.files import write_text
 from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
@@ -19,9 +19,10 @@ from scenenet.figures import Picture
 from scenenet.figures.plots.point_clouds import View, side_views
 from scenenet.interpretability.explanations import TowerExplanation, explanations, meanings
 from scenenet.models.model_file import ModelCard
-from scenenet.pointcloud import iter_chunks, survey_in_metres
+from scenenet.pointcloud import iter_chunks
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.survey_files import SurveyFiles, look_at, readable
 from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section, Text, table, write
 from scenenet.report.page import render
 
@@ -62,15 +63,16 @@ def explain_survey(
         InputError: the survey or the model cannot be used.
         OutputError: the page cannot be written, or a disk has too little space.
     """
-    points = survey_in_metres(survey).n_points
+    headers, _ = look_at(SurveyFiles.of(survey))
+    points = sum(info.n_points for info in headers.values())
     page = FIRST_TOWER_BYTES + POINT_BYTES * points
     # The pictures are drawn to temporary files.
     check_space({Path(out): page, temporary_directory(): SCRATCH_BYTES * points + page})
     with predict_survey(survey, model, settings, detection) as prediction:
-        warn(survey, prediction.warnings)
+        prediction.warn()
         card = prediction.card
         explained = explanations(prediction.towers, card)
-        with unchanged(prediction.state):
+        with unchanged(*prediction.states):
             surroundings = list(_surroundings(prediction, explained))
     facts = [
         ("points", write(prediction.n_points, "count")),
@@ -159,7 +161,8 @@ def _surroundings(
 ) -> Iterator[tuple[np.ndarray, list[View]]]:
     """For each tower the points (n, 3) m within its height in plan, and the views of them."""
     kept: list[list[np.ndarray]] = [[np.empty((0, 4 + len(prediction.geneos)))] for _ in towers]
-    for chunk in track(iter_chunks(prediction.survey), "pictures: chunks read"):
+    chunks = chain.from_iterable(iter_chunks(file.path) for file, _ in readable(prediction.files))
+    for chunk in track(chunks, "pictures: chunks read"):
         for tower, parts in zip(towers, kept, strict=True):
             apart = np.hypot(chunk.xyz[:, 0] - tower.x, chunk.xyz[:, 1] - tower.y)
             xyz = chunk.xyz[apart <= tower.height]

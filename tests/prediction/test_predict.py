@@ -61,11 +61,14 @@ def predict(
     **settings,
 ) -> Prediction:
     folder.mkdir(exist_ok=True)
-    files = PredictionFiles.of(Path("out.laz"), folder)
+    endings = ("gpkg", "geojson", "csv", "json")
+    lists = (folder / f"out.{ending}" for ending in endings)
+    files = PredictionFiles({survey: folder / "out.laz"}, *lists)
     predict_with = PredictSettings(**settings)
     returned = predict_to_files(survey, model, files, predict_with, detection).to_json()
     assert json.loads(files.summary.read_text()) == returned
-    return Prediction(files.points, json.loads(files.geojson.read_text()), returned)
+    [points] = files.points.values()
+    return Prediction(points, json.loads(files.geojson.read_text()), returned)
 
 
 def equal_field_by_field(before: laspy.LasData, after: laspy.LasData) -> None:
@@ -415,9 +418,9 @@ def test_a_survey_replaced_between_the_passes_leaves_the_earlier_result(
     assert first.summary["towers"] == 1
     write = writers.write_points
 
-    def replace_and_write(prediction, out):
+    def replace_and_write(prediction, path, out):
         other.replace(survey)
-        write(prediction, out)
+        return write(prediction, path, out)
 
     monkeypatch.setattr(writers, "write_points", replace_and_write)
     with pytest.raises(InputError, match=r"survey\.las: the file was changed, replaced or removed"):

@@ -57,8 +57,11 @@ def trained_on(survey):
 
 
 def has_map(survey):
-    """Whether a map of the survey can be drawn: TS40K samples are single crops."""
+    """Whether a map of the survey can be drawn: TS40K samples are single crops, and a temporary
+    survey would be made again, with all that follows from it."""
     path = SURVEYS[survey].path
+    if SURVEYS[survey].origin == "synthetic" and settings.synthetic.temporary:
+        return False
     return not Path(path).is_dir() and not path.endswith((".npy", ".pt"))
 
 

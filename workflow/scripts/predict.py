@@ -11,12 +11,13 @@ def predict(job: _job.Job) -> None:
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
-    survey = Path(job.input.survey)
-    require_space({survey: survey_in_metres(survey).n_points}, Path(job.output.points))
+    survey, output = Path(job.input.survey), job.output
+    require_space([{survey: survey_in_metres(survey).n_points}], Path(output.points))
+    lists = (Path(output[name]) for name in ("geopackage", "geojson", "table", "summary"))
     predict_to_files(
         survey,
         job.input.model,
-        PredictionFiles(**{name: Path(job.output[name]) for name in PredictionFiles.names()}),
+        PredictionFiles({survey: Path(output.points)}, *lists),
         PredictSettings(**job.settings),
         DetectionSettings(**job.identity["detection"]),
     )

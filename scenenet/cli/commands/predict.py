@@ -20,6 +20,7 @@ from scenenet.cli.output import show
 
 EXAMPLES = (
     "scenenet predict line.laz --out predicted",
+    "scenenet predict tiles/ --out predicted",
     "scenenet predict surveys/*.laz --model model.json --out predicted --json",
 )
 
@@ -54,10 +55,14 @@ def command(
 ) -> None:
     """Find the towers of surveys and classify every point.
 
+    A survey is a file, a folder of LAS and LAZ files, or a pattern such as 'tiles/*.laz' in quotes.
+    The files of a folder or pattern are one survey with one tower list, wherever it was cut.
+
     Each survey NAME gives these files in the folder --out:
 
     NAME.laz: all points of the survey, in order, each with the probability of a tower, the id of
-    its tower (0 for none) and the share of each GENEO.
+    its tower (0 for none) and the share of each GENEO. A survey of several files has a folder NAME
+    with a file for each.
 
     NAME.gpkg: the towers, the coverage and the file as layers, in the CRS of the survey, with
     styles for QGIS.
@@ -71,31 +76,37 @@ def command(
 
     The exit code is 1 if a survey fails; the other surveys are still predicted.
     """
+    from scenenet.core.errors import InputError
     from scenenet.core.outputs import check_outputs
-    from scenenet.pointcloud import survey_in_metres
     from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.survey_files import SurveyFiles, look_at
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
     settings = PredictSettings(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
     )
-    files = [PredictionFiles.of(survey, out) for survey in surveys]
-    outputs = [o for f, survey in zip(files, surveys, strict=True) for o in f.outputs(survey)]
-    check_outputs(outputs, [*surveys, model], overwrite=overwrite)
     failures = Failures()
-    seen = failures.look_at(surveys, survey_in_metres)
+    named = failures.look_at(surveys, SurveyFiles.of)
+    files = {given: PredictionFiles.of(survey, out) for given, survey in named.items()}
+    outputs = [output for each in files.values() for output in each.outputs()]
+    inputs = [path for survey in named.values() for path in survey.files]
+    check_outputs(outputs, [*inputs, model], overwrite=overwrite)
+    seen = failures.look_at(named, lambda given: look_at(named[given])[0])
     if seen:  # it loads torch, which takes seconds
         from scenenet.models.model_file import read_model
 
         read_model(model)[1].threshold()
-    require_space({survey: info.n_points for survey, info in seen.items()}, out)
+    points = [{path: i.n_points for path, i in headers.items()} for headers in seen.values()]
+    require_space(points, out)
     detection = detection_settings(min_conductor)
     summaries = []
-    for survey, target in zip(surveys, files, strict=True):
-        if survey in seen:
-            with failures.collect():
-                summary = predict_to_files(survey, model, target, settings, detection)
-                summaries.append(summary.to_json())
+    for given in seen:
+        with failures.collect():
+            summary = predict_to_files(named[given], model, files[given], settings, detection)
+            summaries.append(summary.to_json())
+            for file in summary.files:
+                if file["error"]:
+                    failures.errors.append(InputError(file["error"]))
     show(
         summaries,
         as_json,

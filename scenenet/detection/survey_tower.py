@@ -8,7 +8,7 @@ it (``scenenet.prediction.tile_predictions``).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +71,13 @@ class SurveyTower:
         values = {c.name: feature["properties"][c.name] for c in TOWER_COLUMNS}
         values["conductor_bearings"] = tuple(values["conductor_bearings"])
         return cls(**values)
+
+    def in_units(self, sizes: tuple[float, float, float]) -> SurveyTower:
+        """The same tower in units of which x, y and z have these sizes in m."""
+        planar, _, vertical = sizes
+        lengths = dict.fromkeys(("x", "y", "width", "edge_distance"), planar)
+        lengths |= dict.fromkeys(("height", "base"), vertical)
+        return replace(self, **{n: getattr(self, n) / size for n, size in lengths.items()})
 
     def to_row(self) -> dict[str, Any]:
         """The tower as a row of plain values: bearings as a text, a column for each GENEO."""

@@ -17,7 +17,7 @@ from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
 from scenenet.pointcloud.true_classes import ROUNDING_M, check_same_number, with_true_classes
 from scenenet.pointcloud.ts40k import read_sample
-from scenenet.pointcloud.units import NotMetres, not_metres
+from scenenet.pointcloud.units import NotMetres, not_metres, sizes
 
 if TYPE_CHECKING:
     import pyproj
@@ -59,6 +59,11 @@ class SurveyInfo:
     def crs(self) -> pyproj.CRS | None:
         """The coordinate reference system; None if the file names none that is understood."""
         return self.record.crs
+
+    @property
+    def unit_sizes(self) -> tuple[float, float, float]:
+        """Sizes in m of the units of x, y and z (``scenenet.pointcloud.units.sizes``)."""
+        return sizes(self.record)
 
     @property
     def not_metres(self) -> NotMetres | None:
@@ -110,6 +115,18 @@ def survey_in_metres(path: str | Path) -> SurveyInfo:
     """
     info = survey_info(path)
     if reason := info.not_metres:
+        raise reason.error(path)
+    return info
+
+
+def survey_of_lengths(path: str | Path) -> SurveyInfo:
+    """The header of a survey whose coordinates are lengths, in metres or a unit that it states.
+
+    Raises:
+        InputError: as ``survey_info``, and if the coordinates are no lengths.
+    """
+    info = survey_info(path)
+    if (reason := info.not_metres) and not reason.is_length:
         raise reason.error(path)
     return info
 

@@ -1,5 +1,5 @@
 """Whether the coordinates of a survey are metres. Voxels, kernels and towers have sizes in metres,
-so a survey in degrees or feet is refused."""
+so a survey in degrees is refused, and one in feet is refused or converted."""
 
 from __future__ import annotations
 
@@ -33,11 +33,13 @@ class NotMetres(NamedTuple):
         problem: what they are instead.
         place: what states it; None if the numbers show it.
         remedy: what the user can do.
+        is_length: whether they are in another unit of length, which can be converted.
     """
 
     problem: str
     place: str | None
     remedy: str
+    is_length: bool = False
 
     def error(self, file: object) -> InputError:
         return InputError(self.problem, file=str(file), place=self.place, remedy=self.remedy)
@@ -85,7 +87,16 @@ def _not_a_metre(what: str, unit: Unit) -> NotMetres:
         f"the unit of the {what} is the {unit.name} ({unit.metres:.6g} m), not the metre",
         unit.source,
         REPROJECT,
+        is_length=True,
     )
+
+
+def sizes(record: CrsRecord) -> tuple[float, float, float]:
+    """Sizes in m of the units of x, y and z. An unknown unit is the metre, and the unit of z that
+    of x and y if the file does not state it, as LAS files have it."""
+    planar = 1.0 if record.planar is None else record.planar.metres
+    vertical = planar if record.vertical is None else record.vertical.metres
+    return planar, planar, vertical
 
 
 def look_like_degrees(

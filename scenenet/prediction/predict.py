@@ -54,9 +54,10 @@ class SurveyPrediction:
         model, card: the model and what its file says about it.
         settings, detection: the settings of the prediction.
         crs: CRS of the survey; None where its files name none.
+        unit_sizes: sizes in m of the units of its x, y and z.
         n_tiles: tiles of voxels that hold a point.
         voxel_size: m.
-        towers: the towers found, highest probability first.
+        towers: the towers found, highest probability first, in the units of the survey.
         tiles: the predictions on disk; they exist inside the ``with`` block of ``predict_survey``.
         started: ``time.perf_counter()`` at the start.
     """
@@ -68,6 +69,7 @@ class SurveyPrediction:
     settings: PredictSettings
     detection: DetectionSettings
     crs: pyproj.CRS | None
+    unit_sizes: tuple[float, float, float]
     n_tiles: int
     voxel_size: float
     towers: tuple[SurveyTower, ...]
@@ -100,8 +102,8 @@ class SurveyPrediction:
         return self.tiles.geneos
 
     def look_up(self, xyz: np.ndarray) -> PointPredictions:
-        """Probability, tower id and shares of points (n, 3) m of the survey."""
-        return self.tiles.look_up(xyz)
+        """Probability, tower id and shares of points (n, 3) of the survey, in its units."""
+        return self.tiles.look_up(in_metres(xyz, self.unit_sizes))
 
 
 @contextmanager
@@ -143,10 +145,10 @@ def predict_survey(
     voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
     with scratch_folder() as scratch:
         spool = TileSpool(scratch, voxel_size)
-        files, crs = read_files(survey, spool, settings.chunk_points)
+        files, info = read_files(survey, spool, settings.chunk_points)
         tiles = TilePredictions(spool, scratch, geneos)
         tiles.compute(trained, card, f"{survey.given.name}: tiles predicted")
-        towers = tuple(tiles.find_towers(tau, detection))
+        found = tiles.find_towers(tau, detection)
         yield SurveyPrediction(
             survey=survey,
             files=files,
@@ -154,10 +156,11 @@ def predict_survey(
             card=card,
             settings=settings,
             detection=detection,
-            crs=crs,
+            crs=info.crs,
+            unit_sizes=info.unit_sizes,
             n_tiles=len(spool),
             voxel_size=voxel_size,
-            towers=towers,
+            towers=tuple(tower.in_units(info.unit_sizes) for tower in found),
             tiles=tiles,
             started=started,
         )
@@ -165,11 +168,11 @@ def predict_survey(
 
 def read_files(
     survey: SurveyFiles, spool: TileSpool, chunk_points: int
-) -> tuple[tuple[SurveyFile, ...], pyproj.CRS | None]:
+) -> tuple[tuple[SurveyFile, ...], SurveyInfo]:
     """Read all files of a survey into ``spool``.
 
     Returns:
-        the files, and the CRS of the first one that could be read.
+        the files, and the header of the first one that can be used; all have its CRS and units.
 
     Raises:
         InputError: no file can be used, or, of a survey that is one file, that one.
@@ -190,18 +193,23 @@ def read_files(
             files.append(SurveyFile(path, error=error))
     if not any(readable(files)):
         raise nothing_to_use(survey, [file.error for file in files if file.error is not None])
-    return tuple(files), next(iter(headers.values())).crs
+    return tuple(files), next(iter(headers.values()))
 
 
 def _read(path: Path, info: SurveyInfo, spool: TileSpool, chunk_points: int) -> SurveyFile:
     """Read a file into ``spool``, and look at it."""
-    screening, n_points, state = Screening(info), 0, FileState.of(path)
+    screening, n_points, state = Screening(info, converted=True), 0, FileState.of(path)
     with unchanged(state), in_file(path):
         chunks = iter_chunks(path, chunk_points=chunk_points)
         for chunk in track(chunks, f"{path.name}: chunks read"):
             screening.add(chunk.xyz, chunk.classification)
-            spool.add(chunk.xyz)
+            spool.add(in_metres(chunk.xyz, info.unit_sizes))
             n_points += len(chunk)
     screening.raise_if_not_metres()
     extent = (*screening.mins[:2].tolist(), *screening.maxs[:2].tolist()) if n_points else None
     return SurveyFile(path, state, n_points, extent, warnings=screening.warnings())
+
+
+def in_metres(xyz: np.ndarray, unit_sizes: tuple[float, float, float]) -> np.ndarray:
+    """Coordinates (n, 3) in units of these sizes, as metres; metres stay the same to the bit."""
+    return xyz if unit_sizes == (1.0, 1.0, 1.0) else xyz * unit_sizes

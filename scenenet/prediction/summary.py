@@ -24,6 +24,7 @@ class PredictionSummary:
         kernel_size: (kz, ky, kx) in voxels.
         tiles: number of tiles that hold a point.
         crs: CRS of the survey; None where the file names none.
+        unit_sizes_m: sizes of the units of x, y and z, m; results are in these units.
         warnings: what looks wrong about the survey, as sentences.
         files: of each file name, status (``predicted`` or ``failed``), points, points with a tower
             id, and error.
@@ -43,6 +44,7 @@ class PredictionSummary:
     kernel_size: list[int]
     tiles: int
     crs: str | None
+    unit_sizes_m: list[float]
     warnings: list[str]
     files: list[dict[str, Any]]
     seconds: float

@@ -10,8 +10,7 @@ from typing import Any
 
 from scenenet.core.errors import InputError
 from scenenet.core.unchanged import FileState
-from scenenet.pointcloud import survey_in_metres
-from scenenet.pointcloud.reading import SurveyInfo
+from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
 
 SUFFIXES = frozenset({".las", ".laz"})
 """Endings of the files of a folder that belong to a survey; COPC files end in ``.copc.laz``."""
@@ -75,7 +74,7 @@ class SurveyFile:
         state: its state before it was read; a later pass must find the same. None if it could not
             be read.
         n_points: points that were read.
-        extent: (x, y, x, y) m, lowest and highest; None without points.
+        extent: (x, y, x, y), lowest and highest, in its units; None without points.
         tower_points: points with a tower id, once they were written.
         warnings: what looks wrong about it, as sentences.
         error: why it could not be used; None if it could.
@@ -122,7 +121,7 @@ def look_at(survey: SurveyFiles) -> tuple[dict[Path, SurveyInfo], dict[Path, Inp
     errors: dict[Path, InputError] = {}
     for path in survey.files:
         try:
-            info = survey_in_metres(path)
+            info = survey_of_lengths(path)
             _check_system(info, next(iter(headers.values()), info), path)
             headers[path] = info
         except InputError as error:
@@ -145,7 +144,7 @@ def nothing_to_use(survey: SurveyFiles, errors: Sequence[InputError]) -> InputEr
 
 def _check_system(info: SurveyInfo, first: SurveyInfo, path: Path) -> None:
     """Refuse a file in another CRS than the first one."""
-    if info.crs != first.crs:
+    if (info.crs, info.unit_sizes) != (first.crs, first.unit_sizes):
         ours, theirs = (i.crs.name if i.crs else "no CRS" for i in (first, info))
         raise InputError(
             f"the file has {theirs}, and the files before it have {ours}",

@@ -45,14 +45,23 @@ def write_csv(path: str | Path, towers: Iterable[SurveyTower], geneos: Sequence[
         table.writerows(tower.to_row() for tower in towers)
 
 
-def write_geojson(path: str | Path, towers: Sequence[SurveyTower], crs: pyproj.CRS | None) -> None:
+def write_geojson(
+    path: str | Path,
+    towers: Sequence[SurveyTower],
+    crs: pyproj.CRS | None,
+    unit_sizes: tuple[float, float, float],
+) -> None:
     """Write the tower list as GeoJSON.
 
     The coordinates are longitude and latitude in degrees and the elevation of the foot in m, as RFC
     7946 prescribes. Where the CRS is unknown they are those of the survey, and the member
-    ``coordinates`` of the collection is ``survey``. The properties ``x`` and ``y`` are always those
-    of the survey.
+    ``coordinates`` of the collection is ``survey``. Properties are in the units of the survey.
+
+    Args:
+        towers, crs: of the survey.
+        unit_sizes: sizes in m of the units of its x, y and z.
     """
+    vertical = 1.0 if crs is None else unit_sizes[2]
     places = np.array([(tower.x, tower.y) for tower in towers]).reshape(-1, 2)
     collection: dict[str, Any] = {"type": "FeatureCollection"}
     if crs is None:
@@ -63,7 +72,7 @@ def write_geojson(path: str | Path, towers: Sequence[SurveyTower], crs: pyproj.C
         turned = Transformer.from_crs(crs.to_2d(), LONGITUDE_LATITUDE, always_xy=True)
         places = np.column_stack(turned.transform(*places.T))
     collection["features"] = [
-        tower.to_feature([*map(float, place), tower.base])
+        tower.to_feature([*map(float, place), tower.base * vertical])
         for tower, place in zip(towers, places, strict=True)
     ]
     write_json(path, collection)
@@ -74,6 +83,7 @@ def write_geopackage(
     towers: Sequence[SurveyTower],
     geneos: Sequence[str],
     crs: pyproj.CRS | None,
+    unit_sizes: tuple[float, float, float],
     spool: TileSpool,
     files: Sequence[SurveyFile],
 ) -> None:
@@ -86,6 +96,7 @@ def write_geopackage(
         path: ends in ``.gpkg``.
         geneos: names of the GENEOs of the model.
         crs: of the survey; None if it is not known.
+        unit_sizes: sizes in m of the units of its x, y and z.
         spool: the occupied voxels of the survey.
         files: of the survey, a row each in the layer ``tiles``.
     """
@@ -95,19 +106,20 @@ def write_geopackage(
     rows = [tower.to_row() for tower in towers]
     fields = {name: _column([row[name] for row in rows], name) for name in names}
     feet = np.array([(tower.x, tower.y, tower.base) for tower in towers]).reshape(-1, 3)
-    covered = coverage(spool)
-    parts = shapely.get_parts(covered)
+    parts = shapely.get_parts(coverage(spool))
+    area = shapely.area(parts)
+    parts = shapely.transform(parts, lambda xy: xy / unit_sizes[0])
     extents = [shapely.Polygon() if f.extent is None else shapely.box(*f.extent) for f in files]
     facts = [file.to_json() for file in files]
     told = {name: np.array([row[name] for row in facts]) for name in facts[0]}
     _write_layer(path, "towers", "Point Z", shapely.points(feet), fields, crs)
-    _write_layer(path, "coverage", "Polygon", parts, {"area_m2": shapely.area(parts)}, crs)
+    _write_layer(path, "coverage", "Polygon", parts, {"area_m2": area}, crs)
     _write_layer(path, "tiles", "Polygon", extents, told, crs)
     _add_styles(path)
 
 
 def coverage(spool: TileSpool) -> Any:
-    """The cells of ``COVERAGE_CELL`` voxels that hold a point, as one shapely geometry."""
+    """The cells of ``COVERAGE_CELL`` voxels that hold a point, as one shapely geometry, m."""
     import shapely
 
     cells: set[tuple[int, int]] = set()

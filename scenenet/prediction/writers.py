@@ -185,9 +185,11 @@ def write_towers(
     prediction: SurveyPrediction, geopackage: Path, geojson: Path, table: Path
 ) -> None:
     """Write the tower list in each of its formats."""
-    towers, geneos, crs = prediction.towers, prediction.geneos, prediction.crs
-    write_geopackage(geopackage, towers, geneos, crs, prediction.tiles.spool, prediction.files)
-    write_geojson(geojson, towers, crs)
+    towers, geneos = prediction.towers, prediction.geneos
+    crs, sizes = prediction.crs, prediction.unit_sizes
+    spool, files = prediction.tiles.spool, prediction.files
+    write_geopackage(geopackage, towers, geneos, crs, sizes, spool, files)
+    write_geojson(geojson, towers, crs, sizes)
     write_csv(table, towers, geneos)
 
 
@@ -247,6 +249,7 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         kernel_size=list(prediction.model.kernel_size),
         tiles=prediction.n_tiles,
         crs=None if crs is None else crs.to_string(),
+        unit_sizes_m=list(prediction.unit_sizes),
         warnings=[text for file in prediction.files for text in file.warnings],
         files=[file.to_json() for file in prediction.files],
         seconds=time.perf_counter() - prediction.started,

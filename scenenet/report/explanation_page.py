@@ -64,6 +64,9 @@ def explain_survey(
         OutputError: the page cannot be written, or a disk has too little space.
     """
     headers, _ = look_at(SurveyFiles.of(survey))
+    for path, info in headers.items():
+        if reason := info.not_metres:  # the page is in metres
+            raise reason.error(path)
     points = sum(info.n_points for info in headers.values())
     page = FIRST_TOWER_BYTES + POINT_BYTES * points
     # The pictures are drawn to temporary files.

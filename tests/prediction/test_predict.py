@@ -374,15 +374,6 @@ def test_a_survey_that_is_not_in_metres_is_refused(tmp_path, model, epsg, reason
     assert list((tmp_path / "out").iterdir()) == []
 
 
-def test_a_survey_whose_heights_are_in_feet_is_refused(tmp_path, model):
-    xyz = np.random.default_rng(0).uniform(0, 80, (50, 3)) + PLACE
-    cloud = PointCloud(xyz, np.ones(50, np.uint8), crs=pyproj.CRS("EPSG:32629+6360"))
-    write_las(tmp_path / "feet.laz", cloud)
-    with pytest.raises(InputError, match=r"feet\.laz.*unit of the heights is the US survey foot"):
-        predict(tmp_path / "feet.laz", model, tmp_path / "out")
-    assert list((tmp_path / "out").iterdir()) == []
-
-
 def test_what_looks_wrong_is_in_the_summary_and_on_stderr(scene, model, tmp_path, capsys):
     cloud = scene()
     xyz = cloud.xyz.astype(np.float32).astype(np.float64)

@@ -7,12 +7,12 @@ import _job
 
 def predict(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.pointcloud import survey_in_metres
+    from scenenet.pointcloud.reading import survey_of_lengths
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
     survey, output = Path(job.input.survey), job.output
-    require_space([{survey: survey_in_metres(survey).n_points}], Path(output.points))
+    require_space([{survey: survey_of_lengths(survey).n_points}], Path(output.points))
     lists = (Path(output[name]) for name in ("geopackage", "geojson", "table", "summary"))
     predict_to_files(
         survey,

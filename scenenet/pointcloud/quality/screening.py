@@ -28,6 +28,7 @@ STRAY_FACTOR = 10.0
 """Points are stray if they are outside the middle 98 % by this many times its extent."""
 MIN_POINTS = 100
 """Fewer points do not show what the extent of a survey is."""
+CONVERTED = "it is converted, and the results are in the units of the survey"
 NO_SYSTEM = "the file names no coordinate system; its coordinates are taken to be in metres"
 
 
@@ -46,14 +47,19 @@ class Finding(NamedTuple):
 class Screening:
     """What looks wrong about a survey, from its header and its points."""
 
-    def __init__(self, info: SurveyInfo, scheme: ClassScheme | None = None) -> None:
+    def __init__(
+        self, info: SurveyInfo, scheme: ClassScheme | None = None, *, converted: bool = False
+    ) -> None:
         """No point is counted yet.
 
         Args:
             info: the header of the survey.
             scheme: what its class codes mean; None if they are not used.
+            converted: whether the command converts other units of length.
         """
         self.info = info
+        self._converted = converted
+        self._sizes = np.array(info.unit_sizes if converted else (1.0, 1.0, 1.0))
         self.scheme = scheme
         self.n_points = 0
         self.counts = np.zeros(256, np.int64)
@@ -63,7 +69,7 @@ class Screening:
         self._samples: list[np.ndarray] = []
 
     def add(self, xyz: np.ndarray, codes: np.ndarray) -> None:
-        """Look at points (n, 3) with class codes (n,)."""
+        """Look at points (n, 3), in the units of the survey, with class codes (n,)."""
         if len(xyz) == 0:
             return
         self.n_points += len(xyz)
@@ -74,8 +80,8 @@ class Screening:
             self.counts += np.bincount(codes, minlength=256)
         sample = xyz[:: max(1, len(xyz) // SAMPLE_POINTS)]
         self._steps.add(sample)
-        self._relief.add(sample)
-        self._density.add(sample)
+        self._relief.add(sample * self._sizes)
+        self._density.add(sample * self._sizes)
         self._samples.append(sample[:: max(1, len(sample) // 1000)])
 
     @property
@@ -83,9 +89,10 @@ class Screening:
         """Why the coordinates are known not to be metres, from the points themselves."""
         if not self.n_points:
             return None
-        return not_metres(
+        reason = not_metres(
             self.info.record, self.mins.tolist(), self.maxs.tolist(), self.info.scales
         )
+        return None if self._converted and reason and reason.is_length else reason
 
     def raise_if_not_metres(self) -> None:
         """Refuse a survey whose header hides that it is in degrees.
@@ -104,6 +111,8 @@ class Screening:
         if reason := self.not_metres:
             place = f"{reason.place}: " if reason.place else ""
             return [*found, Finding("unit", f"{place}{reason.problem}. {reason.remedy}")]
+        if self._converted and (reason := self.info.not_metres):
+            found.append(Finding("converted", f"{reason.problem}; {CONVERTED}"))
         if self.info.crs is None and not self.info.record.problems:
             found.append(Finding("no system", NO_SYSTEM))
         if self.info.crs is not None:

@@ -116,7 +116,7 @@ def test_check_prints_a_table_for_people(survey):
     assert "Power line support tower" in shown.stdout
 
 
-def test_predict_writes_the_three_files_of_a_survey(survey, model, tmp_path):
+def test_predict_writes_the_files_of_a_survey(survey, model, tmp_path):
     done = scenenet("predict", survey, "--model", model, "--out", tmp_path, "--json")
     assert done.returncode == 0, done.stderr
     names = {f.name for f in tmp_path.iterdir()}

@@ -162,10 +162,10 @@ def cut_crops(
     return facts
 
 
-def read_crops(manifest: str | Path) -> Iterator[tuple[Crop, PointCloud]]:
-    """The crops of a store, one at a time, without the CRS of the survey."""
+def read_crops(manifest: str | Path, step: int = 1) -> Iterator[tuple[Crop, PointCloud]]:
+    """Every ``step``-th crop of a store, one at a time, without the CRS of the survey."""
     reader = StoreReader(manifest)
-    for entry in reader.manifest["crops"]:
+    for entry in reader.manifest["crops"][::step]:
         yield crop_of(entry), _cloud(reader, entry["id"])
 
 

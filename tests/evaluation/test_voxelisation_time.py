@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import pandas as pd
+import pytest
 
 from scenenet.dataset.crops import CropSettings, cut_crops, read_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
 from scenenet.dataset.voxels import VoxelGrid, voxelise
+from scenenet.evaluation import voxelisation_time
 from scenenet.evaluation.voxelisation_time import COLUMNS, RESOLUTIONS, time_grids
 from scenenet.synthetic import SyntheticSettings, make_survey
 
 
-def test_a_row_for_every_crop_and_grid(tmp_path):
+@pytest.mark.parametrize("most", [400, 1])
+def test_a_row_for_every_timed_crop_and_grid(tmp_path, monkeypatch, most):
+    monkeypatch.setattr(voxelisation_time, "MOST_CROPS", most)
     line = tmp_path / "line.laz"
     make_survey(SyntheticSettings(towers=2, seed=5, density=8, tower_density=16), line)
     manifest = tmp_path / "crops.json"
@@ -20,7 +24,8 @@ def test_a_row_for_every_crop_and_grid(tmp_path):
     table = time_grids([manifest], tmp_path / "grids.csv")
     assert tuple(pd.read_csv(tmp_path / "grids.csv").columns) == COLUMNS
     clouds = {crop.id: cloud for crop, cloud in read_crops(manifest)}
-    assert len(table) == len(clouds) * len(RESOLUTIONS) > 0
+    assert len(clouds) == 2
+    assert len(table) == min(most, len(clouds)) * len(RESOLUTIONS)
     assert (table["seconds"] > 0).all()
     for found in table.itertuples():
         cloud = clouds[found.crop]

@@ -28,7 +28,7 @@ TOWER_FORMATS: dict[str, Format] = {"m": "metres", "1": "score", "": "count"}
 """How the tower list writes the values of a column, by its unit."""
 
 TOWERS_LISTED = 300
-"""Longest list of towers on the page; the GeoJSON file has all towers."""
+"""Longest list of towers on the page; the files have all towers."""
 
 LIBRARIES = (
     "scenenet",
@@ -73,7 +73,7 @@ def predictions(context: ReportContext) -> Section | None:
     note = Text(
         "Surveys classified by the model, with the towers it found. The towers have not been "
         "confirmed: review those near the edge of the data or with a low probability. Positions "
-        "are in the CRS of the survey; the GeoJSON files open in any GIS."
+        "are in the CRS of the survey; the GeoPackage of each survey opens in any GIS."
     )
     return Section("predictions", "Classified surveys", [note, *blocks])
 

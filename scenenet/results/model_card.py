@@ -72,6 +72,8 @@ def write_model_card(
     Raises:
         InputError: the model was not evaluated, or is not a SCENE-Net in metres.
     """
+    from scenenet.models.model_file import read_model
+
     name = results.predicting
     best = None if name is None else results.champion(name)
     facts = read_json(model)
@@ -88,7 +90,7 @@ def write_model_card(
         name=name,
         file=Path(out_model).name,
         digest=sha256(model),
-        parameters=best.evaluation.parameters,
+        parameters=read_model(model)[0].n_parameters(),
         surveys=", ".join(results.surveys),
         seed=best.seed,
         n_seeds=len(results.seeds),

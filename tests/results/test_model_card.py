@@ -23,6 +23,7 @@ def test_the_card_has_the_data_and_the_scores_of_the_best_seed(results: Results,
     assert model.read_bytes() == packaged_model().read_bytes()
     text = card.read_text(encoding="utf-8")
     assert sha256(model) in text
+    assert "SCENE-Net, 11 parameters" in text
     best = results.champion("scenenet")
     assert f"seed {best.seed} of 2" in text
     for against, scores in (("labels", best.evaluation), ("truth", best.evaluation.truth)):

@@ -82,19 +82,40 @@ def short_table(values: Values, figures: Figures, runs: Mapping[str, str]) -> st
     return "\n".join([*lines, "", " ".join(_of_run(values, figures, run) for run in runs)])
 
 
-def lines_table(values: Values, run: str) -> str:
-    """Towers and their points in synthetic lines, against the truth: a row for each seed."""
-    head = "seed of the line | found / towers | false | precision of points | recall | IoU"
+def towers_table(values: Values, run: str, first: str, against: str) -> str:
+    """Towers and their points, a row for each file that was evaluated.
+
+    Args:
+        values: of the kept runs.
+        run: its name; its kept file has the same name.
+        first: heading of the first column.
+        against: ``TRUTH`` or empty for the labels.
+    """
+    head = f"{first} | found / towers | false | precision of points | recall | IoU"
     lines = [f"| {head} | position, m | height, m | base, m |", "|---" * 9 + "|"]
-    for row in sorted(values.rows(run, "lines"), key=lambda row: int(row["file"])):
-        towers, points = "truth.towers.", "truth.points."
+    prefix = "truth." if against == TRUTH else ""
+    for row in sorted(values.rows(run, run), key=_number_or_name):
+        towers, points = f"{prefix}towers.", f"{prefix}points."
         there = row[f"{towers}n_true"]
-        found = round(row[f"{towers}recall"] * there)
-        cells = [row["file"], f"{found} / {there}", row[f"{towers}n_predicted"] - found]
-        cells += [f"{row[points + name]:.2f}" for name in ("precision", "recall", "iou")]
-        cells += [f"{row[f'{towers}median_{name}_m']:.2f}" for name in LINE_ERRORS]
-        lines.append(f"| {' | '.join(map(str, cells))} |")
+        found = round((_or_zero(row[f"{towers}recall"])) * there)
+        cells = [str(row["file"]), f"{found} / {there}", str(row[f"{towers}n_predicted"] - found)]
+        cells += [_two(row[points + name]) for name in ("precision", "recall", "iou")]
+        cells += [_two(row[f"{towers}median_{name}_m"]) for name in LINE_ERRORS]
+        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _number_or_name(row: Row) -> tuple[bool, int, str]:
+    name = str(row["file"])
+    return not name.isdigit(), int(name) if name.isdigit() else 0, name
+
+
+def _two(value: float) -> str:
+    return "" if pd.isna(value) else f"{value:.2f}"
+
+
+def _or_zero(value: float) -> float:
+    return 0.0 if pd.isna(value) else value
 
 
 def csv_table(values: Values, run: str, stem: str, columns: Mapping[str, str]) -> str:
@@ -130,6 +151,9 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
     def printed(run: str, file: str, number: int) -> Table:
         return Table((run,), partial(printed_table, values, run, file, number))
 
+    def of_files(run: str, first: str, against: str) -> Table:
+        return Table((run,), partial(towers_table, values, run, first, against))
+
     both = {"synthetic": TRUTH, "ts40k": ""}
     return {
         "figures of both": Table(tuple(both), partial(short_table, values, figures, both)),
@@ -141,7 +165,8 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of its classes": of_csv("dataset", "classes", CLASSES),
         "figures of synthetic and real crops": printed("domain_gap", "crops.txt", 0),
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
-        "figures of synthetic lines": Table(("lines",), partial(lines_table, values, "lines")),
+        "figures of synthetic lines": of_files("lines", "seed of the line", TRUTH),
+        "figures of recordings": of_files("recordings", "recording", ""),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }
 

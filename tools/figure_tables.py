@@ -22,6 +22,15 @@ DATASET = PROPERTY | {"value": "value"} | RANGE | {"thesis": "thesis"} | THESIS
 LABELLED = PROPERTY | {"mean": "mean"} | RANGE | {"thesis_mean": "thesis"} | THESIS
 CLASSES = {"code": "code", "class": "class", "share_percent": "%", "thesis_percent": "thesis, %"}
 """Columns of the tables of a dataset -> their headings."""
+MODELS = {"model": "model", "counted": "counted", "live_share": "live", "precision": "precision",
+          "precision_std": "±", "recall": "recall", "recall_std": "±", "f05": "F0.5",
+          "iou_tower": "IoU of towers", "truth_f05": "F0.5, truth",
+          "thesis_precision": "thesis: precision", "thesis_recall": "recall"}  # fmt: skip
+VERDICTS = {"place": "thesis", "claim": "claim", "verdict": "verdict", "statistic": "statistic",
+            "value": "value", "low": "95 % from", "high": "to"}  # fmt: skip
+PUBLISHED_RUNS = {"variant": "parameters", "seed": "seed", "precision": "precision",
+                  "recall": "recall", "f05": "F0.5"}  # fmt: skip
+"""Columns of the tables of a run at the scale of the thesis -> their headings."""
 LINE_ERRORS = ("error", "height_error", "base_error")
 
 
@@ -163,6 +172,9 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of the dataset": of_csv("dataset", "dataset", DATASET),
         "figures of its labelled towers": of_csv("dataset", "towers", LABELLED),
         "figures of its classes": of_csv("dataset", "classes", CLASSES),
+        "figures of models at the scale of the thesis": of_csv("full", "models", MODELS),
+        "figures of claims at the scale of the thesis": of_csv("full", "claims", VERDICTS),
+        "figures of parameters without training": of_csv("full", "runs", PUBLISHED_RUNS),
         "figures of synthetic and real crops": printed("domain_gap", "crops.txt", 0),
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
         "figures of synthetic lines": of_files("lines", "seed of the line", TRUTH),

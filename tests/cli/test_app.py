@@ -215,7 +215,8 @@ def test_a_survey_is_never_overwritten_by_its_result(survey, model):
 
 
 def test_wrong_calls_end_with_code_2(survey, tmp_path):
-    assert scenenet("evaluate", survey, "--codes", "edp").returncode == 2
+    assert scenenet("evaluate", survey).returncode == 2  # without codes
+    assert scenenet("predict", survey).returncode == 2  # without a folder
     assert (
         scenenet("train", survey, "--codes", "guess", "--out", tmp_path / "m.json").returncode == 2
     )

@@ -14,7 +14,8 @@ import pytest
 
 from scenenet.detection.settings import DetectionSettings
 from scenenet.models.model_file import write_model
-from scenenet.pointcloud import PointCloud, write_las
+from scenenet.models.packaged import packaged_model
+from scenenet.pointcloud import PointCloud, read, write_las
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.writers import PredictionFiles, predict_to_files
 
@@ -79,18 +80,17 @@ def test_the_towers_are_the_same_in_every_unit(scene, model, tmp_path, capsys, s
 
 
 def test_a_real_survey_in_feet_gives_the_towers_of_the_same_in_metres(real_data, tmp_path):
-    from scenenet.models.packaged import packaged_model
-
-    places = []
-    for name in ("autzen_line_w", "autzen_line_w_m"):
-        survey = real_data / "field" / f"{name}.laz"
-        files = PredictionFiles.of(survey, tmp_path)
-        predict_to_files(survey, packaged_model(), files, PredictSettings(), DetectionSettings())
-        collection = json.loads(files.geojson.read_text())
-        to_metres = pyproj.Transformer.from_crs(4326, 26910, always_xy=True)
-        points = np.array([f["geometry"]["coordinates"] for f in collection["features"]])
-        places.append(np.column_stack([*to_metres.transform(*points[:, :2].T), points[:, 2]]))
-    feet, metres = places
-    assert len(feet) == len(metres) >= 4
-    apart = np.linalg.norm(feet[:, None] - metres, axis=2).min(axis=1)
-    assert apart.max() < 0.1
+    survey = real_data / "field" / "autzen_line_w.laz"
+    cloud = read(survey)
+    metres = tmp_path / "metres.laz"
+    write_las(metres, PointCloud(cloud.xyz * FOOT, cloud.classification), scale=1e-4)
+    found = []
+    for path in (survey, metres):
+        files = PredictionFiles.of(path, tmp_path / "out")
+        predict_to_files(path, packaged_model(), files, PredictSettings(), DetectionSettings())
+        found.append(rows(files))
+    assert len(found[0]) == len(found[1]) >= 4
+    for tower, same in zip(*found, strict=True):
+        for name in LENGTHS:
+            length = float(tower[name]) * FOOT
+            assert length == pytest.approx(float(same[name]), abs=0.1), name

@@ -45,6 +45,7 @@ FIGURES = {
     "5.2.6, starts": "study-starts",
 }
 STUDIES = {
+    "without-training": "Table 5.3",
     "ablations": "Table 5.5",
     "kernel-after-training": "Table 5.4",
     "resolution-after-training": "5.2.7, Figure 5.10",

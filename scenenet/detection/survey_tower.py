@@ -7,17 +7,23 @@ it (``scenenet.prediction.tile_predictions``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_origin, get_type_hints
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 
+CONTRIBUTION = "contribution_"
+"""Start of the name of a column with the contribution of a GENEO."""
 
-def _column(unit: str, description: str, *, heading: str | None = None) -> Any:
-    return field(metadata={"unit": unit, "description": description, "heading": heading})
+
+def _column(
+    unit: str, description: str, *, heading: str | None = None, vertical: bool = False
+) -> Any:
+    facts = {"unit": unit, "description": description, "heading": heading, "vertical": vertical}
+    return field(metadata=facts)
 
 
 @dataclass(frozen=True)
@@ -29,8 +35,12 @@ class SurveyTower:
         "m", "easting of the axis of its body, in the CRS of the survey", heading="x"
     )
     y: float = _column("m", "northing of the same place", heading="y")
-    height: float = _column("m", "height of its top above the ground at its axis", heading="height")
-    base: float = _column("m", "elevation of the ground at its axis", heading="base elevation")
+    height: float = _column(
+        "m", "height of its top above the ground at its axis", heading="height", vertical=True
+    )
+    base: float = _column(
+        "m", "elevation of the ground at its axis", heading="base elevation", vertical=True
+    )
     width: float = _column(
         "m", "width of its body at half its height, of one pole for a portal", heading="width"
     )
@@ -75,17 +85,16 @@ class SurveyTower:
     def in_units(self, sizes: tuple[float, float, float]) -> SurveyTower:
         """The same tower in units of which x, y and z have these sizes in m."""
         planar, _, vertical = sizes
-        lengths = dict.fromkeys(("x", "y", "width", "edge_distance"), planar)
-        lengths |= dict.fromkeys(("height", "base"), vertical)
-        return replace(self, **{n: getattr(self, n) / size for n, size in lengths.items()})
+        lengths = [column for column in TOWER_COLUMNS if column.unit == "m"]
+        sized = {c.name: c.value(self) / (vertical if c.vertical else planar) for c in lengths}
+        return replace(self, **sized)
 
     def to_row(self) -> dict[str, Any]:
-        """The tower as a row of plain values: bearings as a text, a column for each GENEO."""
-        row = {c.name: c.value(self) for c in TOWER_COLUMNS if c.name != "contributions"}
-        row["conductor_bearings"] = " ".join(
-            f"{bearing:.1f}" for bearing in self.conductor_bearings
-        )
-        return row | {f"contribution_{name}": share for name, share in self.contributions.items()}
+        """The tower as a row of plain values, with the columns of ``row_types``: bearings as a
+        text, a column for each GENEO."""
+        row = {c.name: c.value(self) for c in TOWER_COLUMNS if c.type is not Mapping}
+        row["conductor_bearings"] = " ".join(f"{b:.1f}" for b in self.conductor_bearings)
+        return row | {f"{CONTRIBUTION}{name}": share for name, share in self.contributions.items()}
 
 
 @dataclass(frozen=True)
@@ -97,28 +106,46 @@ class TowerColumn:
         unit: ``m``, ``degrees``, ``1`` for a ratio, empty for a count or number.
         description: what it is, for the reference page.
         heading: name in tables for people, without the unit; None where tables leave it out.
+        vertical: whether its length is along z, whose unit may differ from that of x and y.
+        type: of its values: ``int``, ``float``, ``tuple`` or ``Mapping``.
     """
 
     name: str
     unit: str
     description: str
     heading: str | None
+    vertical: bool
+    type: type
 
     def value(self, tower: SurveyTower) -> Any:
         """The value of this column for a tower."""
         return getattr(tower, self.name)
 
 
+_TYPES = get_type_hints(SurveyTower)
 TOWER_COLUMNS = tuple(
     TowerColumn(
         name=f.name,
         unit=f.metadata["unit"],
         description=f.metadata["description"],
         heading=f.metadata["heading"],
+        vertical=f.metadata["vertical"],
+        type=get_origin(_TYPES[f.name]) or _TYPES[f.name],
     )
     for f in fields(SurveyTower)
 )
 """Every column of the tower list, in the order in which files and tables have them."""
+
+
+def row_types(geneos: Iterable[str]) -> dict[str, type]:
+    """Column of ``SurveyTower.to_row`` -> type of its values: ``int``, ``float`` or ``str``.
+
+    Args:
+        geneos: names of the GENEOs of the model.
+    """
+    plain = {c.name: str if c.type is tuple else c.type for c in TOWER_COLUMNS}
+    own = {name: kind for name, kind in plain.items() if kind is not Mapping}
+    return own | {f"{CONTRIBUTION}{geneo}": float for geneo in geneos}
 
 
 def read_towers(path: str | Path) -> list[SurveyTower]:

@@ -171,6 +171,9 @@ def read_files(
 ) -> tuple[tuple[SurveyFile, ...], SurveyInfo]:
     """Read all files of a survey into ``spool``.
 
+    The points of a damaged file before its damage stay in ``spool``, as surroundings of its
+    neighbours.
+
     Returns:
         the files, and the header of the first one that can be used; all have its CRS and units.
 

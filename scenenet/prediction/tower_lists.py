@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scenenet.core.files import write_json
-from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower
+from scenenet.detection.survey_tower import SurveyTower, row_types
 from scenenet.prediction.styles import STYLES
 from scenenet.prediction.survey_files import SurveyFile
 from scenenet.prediction.tiling import TileSpool
@@ -31,16 +31,10 @@ COVERAGE_CELL = 8
 """Voxels along the edge of the cells that make up the coverage."""
 
 
-def columns(geneos: Sequence[str]) -> list[str]:
-    """Columns of the CSV file and of the layer ``towers`` (``SurveyTower.to_row``)."""
-    names = [c.name for c in TOWER_COLUMNS if c.name != "contributions"]
-    return names + [f"contribution_{geneo}" for geneo in geneos]
-
-
 def write_csv(path: str | Path, towers: Iterable[SurveyTower], geneos: Sequence[str]) -> None:
     """Write the tower list as CSV, with x and y in the coordinates of the survey."""
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
-        table = csv.DictWriter(stream, columns(geneos), lineterminator="\n")
+        table = csv.DictWriter(stream, list(row_types(geneos)), lineterminator="\n")
         table.writeheader()
         table.writerows(tower.to_row() for tower in towers)
 
@@ -69,8 +63,8 @@ def write_geojson(
     elif len(towers):
         from pyproj import Transformer
 
-        turned = Transformer.from_crs(crs.to_2d(), LONGITUDE_LATITUDE, always_xy=True)
-        places = np.column_stack(turned.transform(*places.T))
+        to_degrees = Transformer.from_crs(crs.to_2d(), LONGITUDE_LATITUDE, always_xy=True)
+        places = np.column_stack(to_degrees.transform(*places.T))
     collection["features"] = [
         tower.to_feature([*map(float, place), tower.base * vertical])
         for tower, place in zip(towers, places, strict=True)
@@ -102,19 +96,22 @@ def write_geopackage(
     """
     import shapely
 
-    names = columns(geneos)
     rows = [tower.to_row() for tower in towers]
-    fields = {name: _column([row[name] for row in rows], name) for name in names}
+    # The types make the columns of an empty list the same as those of a full one.
+    fields: dict[str, np.ndarray] = {
+        name: np.array([row[name] for row in rows], dtype=object if kind is str else kind)
+        for name, kind in row_types(geneos).items()
+    }
     feet = np.array([(tower.x, tower.y, tower.base) for tower in towers]).reshape(-1, 3)
     parts = shapely.get_parts(coverage(spool))
     area = shapely.area(parts)
     parts = shapely.transform(parts, lambda xy: xy / unit_sizes[0])
     extents = [shapely.Polygon() if f.extent is None else shapely.box(*f.extent) for f in files]
     facts = [file.to_json() for file in files]
-    told = {name: np.array([row[name] for row in facts]) for name in facts[0]}
+    attributes = {name: np.array([row[name] for row in facts]) for name in facts[0]}
     _write_layer(path, "towers", "Point Z", shapely.points(feet), fields, crs)
     _write_layer(path, "coverage", "Polygon", parts, {"area_m2": area}, crs)
-    _write_layer(path, "tiles", "Polygon", extents, told, crs)
+    _write_layer(path, "tiles", "Polygon", extents, attributes, crs)
     _add_styles(path)
 
 
@@ -134,14 +131,6 @@ def coverage(spool: TileSpool) -> Any:
     return shapely.union_all(shapely.box(*low.T, *high.T))
 
 
-def _column(values: list[Any], name: str) -> np.ndarray:
-    """The values of a column, with the type that it has where the list is empty, too."""
-    kinds = {"id": np.int64, "conductor_directions": np.int64, "points": np.int64}
-    if name == "conductor_bearings":
-        return np.array(values, dtype=object)
-    return np.array(values, dtype=kinds.get(name, np.float64))
-
-
 def _write_layer(
     path: str | Path,
     name: str,
@@ -150,6 +139,16 @@ def _write_layer(
     fields: Mapping[str, np.ndarray],
     crs: pyproj.CRS | None,
 ) -> None:
+    """Add a layer to a GeoPackage, or start it.
+
+    Args:
+        path: of the GeoPackage.
+        name: of the layer.
+        kind: geometry type of OGR, such as ``Point Z``.
+        geometry: shapely geometries, one for each row.
+        fields: column -> its values, one for each row.
+        crs: of the coordinates; None if it is not known.
+    """
     import shapely
     from pyogrio import set_gdal_config_options
     from pyogrio.raw import write

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -100,7 +100,7 @@ class PredictionFiles:
         return written
 
 
-def require_space(surveys: Iterable[Mapping[Path, int]], out: Path) -> None:
+def require_space(surveys: Sequence[Mapping[Path, int]], out: Path) -> None:
     """Check that the disks have room for all results, and for the temporary files of one survey.
 
     Args:

@@ -84,13 +84,6 @@ def equal_field_by_field(before: laspy.LasData, after: laspy.LasData) -> None:
 
 
 @pytest.fixture(scope="module")
-def model(pole_finder, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("model") / "by-hand.json"
-    write_model(path, *pole_finder)
-    return path
-
-
-@pytest.fixture(scope="module")
 def survey(scene, tmp_path_factory) -> Path:
     """A pole and a tree on 70 x 60 m of flat ground, with a CRS and a dimension of its own."""
     cloud = scene([(20.5, 31.5)], size=(70.0, 60.0), tree=(45.0, 40.0))

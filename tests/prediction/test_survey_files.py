@@ -14,7 +14,6 @@ import pytest
 
 from scenenet.core.errors import InputError
 from scenenet.detection.settings import DetectionSettings
-from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, write_las
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles
@@ -22,13 +21,6 @@ from scenenet.prediction.writers import PredictionFiles, predict_to_files
 
 LONE_POLES = DetectionSettings(min_conductor=0)
 UTM = pyproj.CRS(32629)
-
-
-@pytest.fixture(scope="module")
-def model(pole_finder, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("model") / "by-hand.json"
-    write_model(path, *pole_finder)
-    return path
 
 
 @pytest.fixture(scope="module")

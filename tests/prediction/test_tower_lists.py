@@ -17,7 +17,6 @@ import shapely
 from scenenet.core.files import sha256
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower, read_towers
-from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, write_las
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.writers import PredictionFiles, predict_to_files
@@ -25,13 +24,6 @@ from scenenet.prediction.writers import PredictionFiles, predict_to_files
 LONE_POLES = DetectionSettings(min_conductor=0)
 POLE, UNIT = (500_020.5, 4_630_031.5), 32629
 VEGETATION, TOWER = 4, 15
-
-
-@pytest.fixture(scope="module")
-def model(pole_finder, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("model") / "by-hand.json"
-    write_model(path, *pole_finder)
-    return path
 
 
 @pytest.fixture(scope="module")

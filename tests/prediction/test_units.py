@@ -13,7 +13,6 @@ import pyproj
 import pytest
 
 from scenenet.detection.settings import DetectionSettings
-from scenenet.models.model_file import write_model
 from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud import PointCloud, read, write_las
 from scenenet.prediction.settings import PredictSettings
@@ -28,13 +27,6 @@ SYSTEMS = [
     ("EPSG:2992", (FOOT, FOOT, FOOT)),  # feet; heights without a unit have that of the plan
     ("EPSG:2229+5703", (SURVEY_FOOT, SURVEY_FOOT, 1.0)),  # heights in metres
 ]
-
-
-@pytest.fixture(scope="module")
-def model(pole_finder, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("model") / "by-hand.json"
-    write_model(path, *pole_finder)
-    return path
 
 
 def predict(cloud: PointCloud, model: Path, folder: Path) -> PredictionFiles:

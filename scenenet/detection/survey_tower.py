@@ -30,7 +30,11 @@ def _column(
 class SurveyTower:
     """A tower of the tower list. ``TOWER_COLUMNS`` says what each field is."""
 
-    id: int = _column("", "number in the list, from 1", heading="tower")
+    id: int = _column(
+        "",
+        "number that follows from its place; above 0, and unique in the survey",
+        heading="tower",
+    )
     x: float = _column(
         "m", "easting of the axis of its body, in the CRS of the survey", heading="x"
     )

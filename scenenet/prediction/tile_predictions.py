@@ -16,6 +16,7 @@ from scenenet.detection.find import MeasuredTower, find_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.structure import Structure
 from scenenet.detection.survey_tower import SurveyTower
+from scenenet.detection.tower_ids import tower_ids
 from scenenet.prediction.surroundings import occupied_voxels, survey_points
 from scenenet.prediction.tiling import EDGE, Tile, TileSpool, code_of, groups
 
@@ -100,7 +101,7 @@ class TilePredictions:
         self.spool = spool
         self.geneos = tuple(geneos)
         self._folder = folder
-        self._structures: list[Structure] = []
+        self._structures: list[tuple[int, Structure]] = []
         self._cached = lru_cache(maxsize=64)(self._read)
 
     def compute(self, model: VoxelModel, card: ModelCard, label: str) -> None:
@@ -131,13 +132,14 @@ class TilePredictions:
             settings,
         )
         towers = []
-        for number, tower in enumerate(found, start=1):
+        numbers = tower_ids(np.array([(tower.x, tower.y) for tower in found]).reshape(-1, 2))
+        for number, tower in zip(numbers, found, strict=True):
             place = np.array([tower.x, tower.y])
             near = points(place, tower.structure.reach)
             own = near[tower.structure.contains(near)]
             own = own[self._owner(own) == 0]  # points in two shapes belong to the earlier tower
             self._number(own, number)
-            self._structures.append(tower.structure)
+            self._structures.append((number, tower.structure))
             distance = edge_distance(place, occupied(place, MAX_M * 1.5)[:, :2])
             mean_shares = shares[tower.voxels].mean(axis=0)
             towers.append(self._entry(tower, number, len(own), distance, mean_shares))
@@ -197,7 +199,7 @@ class TilePredictions:
     def _owner(self, xyz: np.ndarray) -> np.ndarray:
         """(n,) uint32, id of the first tower whose shape has each of the points (n, 3) m, or 0."""
         owner = np.zeros(len(xyz), np.uint32)
-        for number, structure in enumerate(self._structures, start=1):
+        for number, structure in self._structures:
             away = np.hypot(xyz[:, 0] - structure.x, xyz[:, 1] - structure.y)
             rows = np.flatnonzero((owner == 0) & (away <= structure.reach))
             owner[rows[structure.contains(xyz[rows])]] = number

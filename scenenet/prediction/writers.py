@@ -197,7 +197,7 @@ def point_dimensions(geneos: Iterable[str]) -> dict[str, tuple[type, str]]:
     """The extra dimensions of a classified survey: name -> (numpy type, description)."""
     dimensions: dict[str, tuple[type, str]] = {
         PROBABILITY: (np.float32, "probability of a tower"),
-        TOWER_ID: (np.uint32, "tower number, 0 none"),
+        TOWER_ID: (np.uint32, "id of tower, 0 none"),
     }
     shares = {f"{SHARE_PREFIX}{geneo}": (np.float32, "share of the response") for geneo in geneos}
     return dimensions | shares

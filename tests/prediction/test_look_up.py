@@ -70,8 +70,9 @@ def test_points_in_the_shapes_of_two_towers_belong_to_the_first(opened):
     prediction, cloud = opened
     own = prediction.look_up(cloud.xyz).tower_id > 0
     structures = prediction.tiles._structures
-    beside = structures[0].moved(-0.25, 0.0, 0.0)
-    structures.insert(0, beside)
+    number, structure = structures[0]
+    beside = structure.moved(-0.25, 0.0, 0.0)
+    structures.insert(0, (1, beside))
     try:
         numbers = prediction.look_up(cloud.xyz).tower_id[own]
     finally:
@@ -79,4 +80,4 @@ def test_points_in_the_shapes_of_two_towers_belong_to_the_first(opened):
     in_first = beside.contains(cloud.xyz[own])
     assert 0 < in_first.sum() < own.sum()
     # The others are in the same voxels, and in the second shape.
-    assert np.array_equal(numbers, np.where(in_first, 1, 2))
+    assert np.array_equal(numbers, np.where(in_first, 1, number))

@@ -15,6 +15,7 @@ import torch
 
 from scenenet.core.errors import InputError
 from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.tower_ids import tower_ids
 from scenenet.models.cnn import CNN
 from scenenet.models.factory import new_model
 from scenenet.models.model_file import ModelCard, read_model, write_model
@@ -27,6 +28,7 @@ from scenenet.training.tuning import choose
 
 PLACE = np.array([544_000.0, 4_634_000.0, 100.0])
 POLE = (500_020.5, 4_630_031.5)
+POLE_ID = 1000263003
 DUTCH_TOWER_HEIGHT_M = 42.0
 LONE_POLES = DetectionSettings(min_conductor=0)
 """For scenes with poles without conductors."""
@@ -117,7 +119,7 @@ def test_the_tower_is_listed_where_it_stands(predicted):
     assert tower["geometry"]["type"] == "Point"
     properties = tower["properties"]
     assert (properties["x"], properties["y"]) == pytest.approx(POLE, abs=0.5)
-    assert properties["id"] == 1
+    assert properties["id"] == tower["id"] == POLE_ID
     assert properties["height"] == pytest.approx(14.0, abs=1.0)
     assert properties["base"] == pytest.approx(100.0, abs=1.0)
     assert 0.7 <= properties["probability"] <= 1.0
@@ -147,13 +149,13 @@ def test_conductors_are_listed_and_a_lone_pole_is_not_a_tower(scene, model, tmp_
     assert properties["conductor_directions"] == 2
     assert sorted(round(b) % 360 for b in properties["conductor_bearings"]) == [0, 180]
     assert 0.4 <= properties["width"] <= 0.8
-    assert set(np.unique(found.points["tower_id"])) == {0, 1}
+    assert set(np.unique(found.points["tower_id"])) == {0, POLE_ID}
 
 
 def test_the_points_of_the_tower_carry_its_number(predicted):
     points = predicted.points
-    of_tower = points["tower_id"] == 1
-    assert set(np.unique(points["tower_id"])) == {0, 1}
+    of_tower = points["tower_id"] == POLE_ID
+    assert set(np.unique(points["tower_id"])) == {0, POLE_ID}
     assert of_tower.sum() == predicted.towers["features"][0]["properties"]["points"] > 100
     away = np.hypot(points.x[of_tower] - POLE[0], points.y[of_tower] - POLE[1])
     assert away.max() < 0.6
@@ -242,7 +244,8 @@ def test_towers_are_numbered_in_the_list_and_in_the_points(scene, model, tmp_pat
     line = predict(tmp_path / "line.laz", model, tmp_path / "out")
     assert line.towers["coordinates"] == "survey"  # it has no CRS, and none is invented
     places = {f["id"]: f["geometry"]["coordinates"][:2] for f in line.towers["features"]}
-    assert sorted(places) == [1, 2, 3]
+    assert sorted(places) == sorted(tower_ids(np.array(list(places.values()))))
+    assert set(np.unique(line.points["tower_id"])) == {0, *places}
     assert sorted(round(x - 500_000.5) for x, _ in places.values()) == [15, 75, 135]
     for number, (x, y) in places.items():
         mine = line.points["tower_id"] == number
@@ -276,7 +279,7 @@ def test_a_sample_comes_back_as_laz(scene, model, tmp_path):
     np.testing.assert_allclose(xyz, cloud.xyz, atol=0.0005001)
     np.testing.assert_array_equal(points.classification, cloud.classification)
     assert len(sample.towers["features"]) == 1
-    assert (points["tower_id"] == 1).any()
+    assert (points["tower_id"] == sample.towers["features"][0]["id"]).any()
 
 
 def test_a_point_outside_the_lattice_is_named_and_nothing_is_written(scene, model, tmp_path):

@@ -88,6 +88,37 @@ def test_any_cut_gives_the_uncut_result(uncut, whole, model, tmp_path, seed):
     np.testing.assert_array_equal(rows(files), rows(whole))
 
 
+def ids(files: PredictionFiles) -> dict[tuple[int, int], str]:
+    """Place of each tower in m -> its id in the list."""
+    with files.table.open(newline="") as stream:
+        return {
+            (round(float(row["x"])), round(float(row["y"]))): row["id"]
+            for row in csv.DictReader(stream)
+        }
+
+
+def test_a_tile_added_or_removed_elsewhere_changes_no_id(scene, uncut, whole, model, tmp_path):
+    corridor = cut(uncut, tmp_path / "tiles", random_parts(uncut, 0))
+    # The higher poles of the new tile come first in the list, and lie before the others in x and y.
+    added = scene([(20.5, 15.5), (60.5, 15.5)], size=(81.0, 31.0), tree=None, seed=5, height=17.0)
+    moved = added.xyz - (3000.0, 800.0, 0.0)
+    write_las(corridor / "a-new.laz", PointCloud(moved, added.classification, crs=UTM))
+    more = predict(corridor, model, tmp_path / "more")
+    before, after = ids(whole), ids(more)
+    assert len(before) == 3 and len(after) == 5
+    assert {place: after[place] for place in before} == before
+    in_points = {int(number) for number in np.unique(rows(more)[:, 3])}
+    assert in_points == {0, *map(int, after.values())}
+
+    points = laspy.read(uncut)
+    east = laspy.LasData(points.header)
+    east.points = points.points[points.x > points.header.mins[0] + 85]
+    east.write(tmp_path / "east.laz")
+    alone = ids(predict(tmp_path / "east.laz", model, tmp_path / "alone"))
+    assert len(alone) == 1
+    assert alone.items() <= before.items()
+
+
 def test_each_file_is_written_under_its_name_and_the_lists_once(uncut, model, tmp_path):
     tiles = cut(uncut, tmp_path / "tiles", random_parts(uncut, 0))
     predict(tiles, model, tmp_path / "out")

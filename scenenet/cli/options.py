@@ -41,11 +41,17 @@ else:
     Kinds = _choices("Kinds", _KINDS)
     """Architectures (``scenenet.models.settings``)."""
 
-Survey = Annotated[Path, typer.Argument(help="LAS, LAZ or COPC survey, or TS40K sample.")]
+Survey = Annotated[
+    Path,
+    typer.Argument(
+        help="LAS, LAZ or COPC survey, folder, pattern or index of tiles, or TS40K sample."
+    ),
+]
 Surveys = Annotated[
     list[Path],
     typer.Argument(
-        help="LAS, LAZ or COPC surveys, folders or patterns of tiles, or TS40K samples (.npy, .pt)."
+        help="LAS, LAZ or COPC surveys, folders, patterns or indexes of tiles, or TS40K samples "
+        "(.npy, .pt)."
     ),
 ]
 Labelled = Annotated[

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,14 +21,9 @@ from scenenet.detection.survey_tower import SurveyTower
 from scenenet.pointcloud import iter_chunks
 from scenenet.pointcloud.quality.screening import Screening
 from scenenet.pointcloud.reading import SurveyInfo
+from scenenet.prediction.file_status import SurveyFile, readable
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.survey_files import (
-    SurveyFile,
-    SurveyFiles,
-    look_at,
-    nothing_to_use,
-    readable,
-)
+from scenenet.prediction.survey_files import SurveyFiles, look_at, nothing_to_use
 from scenenet.prediction.tile_predictions import PointPredictions, TilePredictions
 from scenenet.prediction.tiling import TileSpool
 
@@ -88,6 +83,7 @@ class SurveyPrediction:
 
     def warn(self) -> None:
         """Print what looks wrong about the files; what is wrong with several of them, once."""
+        warn(self.survey.given, self.survey.notes)
         found: dict[str, list[Path]] = {}
         for file in self.files:
             for text in file.warnings:
@@ -125,8 +121,8 @@ def predict_survey(
     ``scenenet.prediction.writers`` writes a prediction to files.
 
     Args:
-        survey: LAS, LAZ, COPC or TS40K sample; a folder or a pattern of LAS and LAZ files. Of a
-            folder or pattern, a file that cannot be used is left out, with its error in ``files``.
+        survey: LAS, LAZ, COPC or TS40K sample; a folder, a pattern or a tile index of LAS and LAZ
+            files, of which one that cannot be used has its error in ``files``.
         model: model file with tau.
 
     Raises:
@@ -182,18 +178,19 @@ def read_files(
     """
     headers, errors = look_at(survey)
     check_space({temporary_directory(): SCRATCH_BYTES * sum(i.n_points for i in headers.values())})
-    files = []
+    files, names = [], survey.names
     for path in survey.files:
         try:
             if path in errors:
                 raise errors[path]
-            files.append(_read(path, headers[path], spool, chunk_points))
+            read = _read(path, headers[path], spool, chunk_points)
+            files.append(replace(read, name=names[path]))
         except OutputError:
             raise
         except InputError as error:
             if not survey.tiled:
                 raise
-            files.append(SurveyFile(path, error=error))
+            files.append(SurveyFile(path, names[path], error=error))
     if not any(readable(files)):
         raise nothing_to_use(survey, [file.error for file in files if file.error is not None])
     return tuple(files), next(iter(headers.values()))
@@ -210,7 +207,7 @@ def _read(path: Path, info: SurveyInfo, spool: TileSpool, chunk_points: int) -> 
             n_points += len(chunk)
     screening.raise_if_not_metres()
     extent = (*screening.mins[:2].tolist(), *screening.maxs[:2].tolist()) if n_points else None
-    return SurveyFile(path, state, n_points, extent, warnings=screening.warnings())
+    return SurveyFile(path, path.name, state, n_points, extent, warnings=screening.warnings())
 
 
 def in_metres(xyz: np.ndarray, unit_sizes: tuple[float, float, float]) -> np.ndarray:

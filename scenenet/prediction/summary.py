@@ -26,8 +26,7 @@ class PredictionSummary:
         crs: CRS of the survey; None where the file names none.
         unit_sizes_m: sizes of the units of x, y and z, m; results are in these units.
         warnings: what looks wrong about the survey, as sentences.
-        files: of each file name, status (``predicted`` or ``failed``), points, points with a tower
-            id, and error.
+        files: of each file what ``SurveyFile.to_json`` gives.
         seconds: time of the prediction, files included, s.
         settings: settings of the prediction, with those of ``detection``.
         model_provenance: provenance of the model.

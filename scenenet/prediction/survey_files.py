@@ -1,19 +1,17 @@
-"""A survey as a user names it: one file, or all files of a folder or of a pattern."""
+"""A survey as a user names it: one file, or all files of a folder, a pattern or a tile index."""
 
 from __future__ import annotations
 
 import glob
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from scenenet.core.errors import InputError
-from scenenet.core.unchanged import FileState
 from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
-
-SUFFIXES = frozenset({".las", ".laz"})
-"""Endings of the files of a folder that belong to a survey; COPC files end in ``.copc.laz``."""
+from scenenet.prediction.file_status import LeftOut
+from scenenet.prediction.tile_index import INDEX_SUFFIXES, SUFFIXES, read_index
 
 
 @dataclass(frozen=True)
@@ -23,25 +21,34 @@ class SurveyFiles:
     Attributes:
         given: what the user named.
         name: of its results.
-        files: its files, sorted by name.
-        tiled: whether it was named as a folder or a pattern. One bad file then stops no other.
+        files: its files; those of a folder or a pattern are sorted by name.
+        tiled: whether it was named as a folder, a pattern or a tile index. One bad file then stops
+            no other.
+        refused: the files that cannot be opened, with the reason, such as the URLs of an index.
+        notes: what looks wrong about the list of files, as sentences.
     """
 
     given: Path
     name: str
     files: tuple[Path, ...]
     tiled: bool = False
+    refused: Mapping[Path, InputError] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, given: str | Path) -> SurveyFiles:
-        """The survey that is a file, the LAS and LAZ files of a folder, or those of a pattern.
+        """The survey that is a file, or the LAS and LAZ files of a folder, a pattern or an index.
 
         Whether a single file exists is not looked at.
 
         Raises:
-            InputError: the folder or the pattern has no such file.
+            InputError: the folder or the pattern has no such file, or the index cannot be read.
         """
         given = Path(given)
+        if given.suffix.lower() in INDEX_SUFFIXES and given.is_file():
+            index = read_index(given)
+            files = (*index.files, *index.refused)
+            return cls(given, given.stem, files, True, index.refused, index.notes)
         if given.is_dir():
             found = [path for path in given.iterdir() if path.suffix.lower() in SUFFIXES]
             name = given.resolve().name
@@ -55,60 +62,30 @@ class SurveyFiles:
             raise InputError(
                 "there is no LAS or LAZ file in it",
                 file=given,
-                remedy="Name a survey file, a folder of tiles, or a pattern such as 'tiles/*.laz'",
+                remedy="Name a survey file, a folder of tiles, a pattern such as 'tiles/*.laz', or "
+                "a tile index",
             )
         return cls(given, name, tuple(sorted(found)), tiled=True)
+
+    @property
+    def names(self) -> Mapping[Path, str]:
+        """The name of each file in the results: that of the file, or its path below the folder of
+        all files if the results of two would have the same name."""
+        names = {path: path.name for path in self.files}
+        there = [path.absolute() for path in self.files if path not in self.refused]
+        if len({result_stem(path) for path in there}) < len(there):
+            base = os.path.commonpath([path.parent for path in there])
+            names |= {
+                path: path.absolute().relative_to(base).as_posix()
+                for path in self.files
+                if path not in self.refused
+            }
+        return names
 
 
 def result_stem(path: Path) -> str:
     """Name of the results of a file; ``.copc`` is not part of it."""
     return path.stem.removesuffix(".copc")
-
-
-@dataclass(frozen=True)
-class SurveyFile:
-    """A file of a survey, after it was read.
-
-    Attributes:
-        path: the file.
-        state: its state before it was read; a later pass must find the same. None if it could not
-            be read.
-        n_points: points that were read.
-        extent: (x, y, x, y), lowest and highest, in its units; None without points.
-        tower_points: points with a tower id, once they were written.
-        warnings: what looks wrong about it, as sentences.
-        error: why it could not be used; None if it could.
-    """
-
-    path: Path
-    state: FileState | None = None
-    n_points: int = 0
-    extent: tuple[float, float, float, float] | None = None
-    tower_points: int = 0
-    warnings: tuple[str, ...] = ()
-    error: InputError | None = None
-
-    @property
-    def status(self) -> str:
-        """Whether its points were predicted."""
-        return "predicted" if self.error is None else "failed"
-
-    def to_json(self) -> dict[str, Any]:
-        """What the summary has of it; also the attributes of its polygon in the GeoPackage."""
-        return {
-            "file": self.path.name,
-            "status": self.status,
-            "points": self.n_points,
-            "tower_points": self.tower_points,
-            "error": "" if self.error is None else str(self.error),
-        }
-
-
-def readable(files: Iterable[SurveyFile]) -> Iterator[tuple[SurveyFile, FileState]]:
-    """The files that could be read, each with its state."""
-    for file in files:
-        if file.error is None and file.state is not None:
-            yield file, file.state
 
 
 def look_at(survey: SurveyFiles) -> tuple[dict[Path, SurveyInfo], dict[Path, InputError]]:
@@ -118,8 +95,10 @@ def look_at(survey: SurveyFiles) -> tuple[dict[Path, SurveyInfo], dict[Path, Inp
         InputError: no file can be used, or, of a survey that is one file, that one.
     """
     headers: dict[Path, SurveyInfo] = {}
-    errors: dict[Path, InputError] = {}
+    errors: dict[Path, InputError] = dict(survey.refused)
     for path in survey.files:
+        if path in errors:
+            continue
         try:
             info = survey_of_lengths(path)
             _check_system(info, next(iter(headers.values()), info), path)
@@ -143,10 +122,10 @@ def nothing_to_use(survey: SurveyFiles, errors: Sequence[InputError]) -> InputEr
 
 
 def _check_system(info: SurveyInfo, first: SurveyInfo, path: Path) -> None:
-    """Refuse a file in another CRS than the first one."""
+    """Leave out a file in another CRS than the first one."""
     if (info.crs, info.unit_sizes) != (first.crs, first.unit_sizes):
         ours, theirs = (i.crs.name if i.crs else "no CRS" for i in (first, info))
-        raise InputError(
+        raise LeftOut(
             f"the file has {theirs}, and the files before it have {ours}",
             file=path,
             remedy="Predict it by itself, or convert it first (pdal translate -f reprojection)",

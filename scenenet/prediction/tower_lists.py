@@ -14,8 +14,8 @@ import numpy as np
 
 from scenenet.core.files import write_json
 from scenenet.detection.survey_tower import SurveyTower, row_types
+from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.styles import STYLES
-from scenenet.prediction.survey_files import SurveyFile
 from scenenet.prediction.tiling import TileSpool
 
 if TYPE_CHECKING:

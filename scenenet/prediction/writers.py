@@ -17,10 +17,11 @@ from scenenet.core.provenance import fingerprint
 from scenenet.core.scratch import temporary_directory
 from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud import add_dimensions
+from scenenet.prediction.file_status import SurveyFile, write_status
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
-from scenenet.prediction.survey_files import SurveyFile, SurveyFiles, result_stem
+from scenenet.prediction.survey_files import SurveyFiles, result_stem
 from scenenet.prediction.tower_lists import write_csv, write_geojson, write_geopackage
 
 PROBABILITY = "tower_probability"
@@ -44,6 +45,7 @@ class PredictionFiles:
             (LAZ).
         geopackage, geojson, table: the tower list (``scenenet.prediction.tower_lists``).
         summary: ``PredictionSummary`` (JSON).
+        status: a row per file of the survey (CSV); None for a survey that is one file.
     """
 
     points: Mapping[Path, Path]
@@ -51,22 +53,34 @@ class PredictionFiles:
     geojson: Path
     table: Path
     summary: Path
+    status: Path | None = None
 
     @classmethod
     def of(cls, survey: SurveyFiles | Path, folder: Path) -> PredictionFiles:
         """The files that the command line writes for a survey. The points of one with several files
-        are in a folder with its name."""
+        are in a folder with its name, with its status."""
         if not isinstance(survey, SurveyFiles):
             survey = SurveyFiles.of(survey)
         place = folder / survey.name if survey.tiled else folder
-        points = {path: place / f"{result_stem(path)}.laz" for path in survey.files}
-        endings = (".gpkg", ".towers.geojson", ".towers.csv", ".summary.json")
-        return cls(points, *(folder / f"{survey.name}{ending}" for ending in endings))
+        points = {
+            path: (place / name).with_name(f"{result_stem(path)}.laz")
+            for path, name in survey.names.items()
+            if path not in survey.refused
+        }
+        return cls(
+            points,
+            geopackage=folder / f"{survey.name}.gpkg",
+            geojson=folder / f"{survey.name}.towers.geojson",
+            table=folder / f"{survey.name}.towers.csv",
+            summary=folder / f"{survey.name}.summary.json",
+            status=place / "status.csv" if survey.tiled else None,
+        )
 
     @property
-    def lists(self) -> tuple[Path, Path, Path]:
-        """The files of the tower list."""
-        return self.geopackage, self.geojson, self.table
+    def lists(self) -> tuple[Path, ...]:
+        """The tower list in its formats, and the status."""
+        lists = (self.geopackage, self.geojson, self.table)
+        return lists if self.status is None else (*lists, self.status)
 
     def outputs(self) -> list[Output]:
         lists = [Output(path, self.is_own) for path in (*self.lists, self.summary)]
@@ -127,11 +141,12 @@ def predict_to_files(
 
     The survey is read twice: once for its occupied voxels, once to write every point back. Of a
     survey that is one file, all results appear, or none. Of one with several files, each file
-    appears whole; one that fails stops no other and is named in the summary and in the layer
-    ``tiles``.
+    appears whole; one that fails stops no other and is named in the summary, in the layer ``tiles``
+    and in the status.
 
     Args:
-        survey: LAS, LAZ, COPC or TS40K sample; a folder or a pattern of LAS and LAZ files.
+        survey: LAS, LAZ, COPC or TS40K sample; a folder, a pattern or a tile index of LAS and LAZ
+            files.
         model: model file with tau.
         files: to write.
 
@@ -152,7 +167,9 @@ def predict_to_files(
         lists = [stack.enter_context(atomic(path)) for path in files.lists]
         record = stack.enter_context(atomic(files.summary))
         prediction = replace(prediction, files=read)
-        write_towers(prediction, *lists)
+        write_towers(prediction, *lists[:3])
+        if files.status is not None:
+            write_status(lists[3], prediction.files)
         written |= {files.key(p): fingerprint(f) for p, f in zip(files.lists, lists, strict=True)}
         summary = summarise(prediction, written)
         write_json(record, summary.to_json())
@@ -166,8 +183,8 @@ def _write_tiles(
     """Write the points of each file that was read, and the fingerprint of each into ``written``."""
     read = []
     for file in prediction.files:
-        target = files.points[file.path]
         if file.error is None:
+            target = files.points[file.path]
             try:
                 with atomic(target) as partial:
                     file = write_points(prediction, file.path, partial)
@@ -207,18 +224,20 @@ def write_points(prediction: SurveyPrediction, path: Path, out: str | Path) -> S
     """Write every point of a file back, in order, with ``point_dimensions`` added.
 
     Returns:
-        the file, with the number of points that have a tower id.
+        the file, with the numbers of its towers and of the points that have a tower id.
 
     Raises:
         InputError: the file changed after it was read; ``out`` stays as it was.
     """
     [file] = [file for file in prediction.files if file.path == path]
     chosen, in_tower = prediction.settings.classify_from, 0
+    towers: set[int] = set()
 
     def values(xyz: np.ndarray) -> dict[str, np.ndarray]:
         nonlocal in_tower
         points = prediction.look_up(xyz)
         in_tower += int(np.count_nonzero(points.tower_id))
+        towers.update(np.unique(points.tower_id[points.tower_id > 0]).tolist())
         shares = zip(prediction.geneos, points.shares.T, strict=True)
         named = {f"{SHARE_PREFIX}{geneo}": share for geneo, share in shares}
         return {PROBABILITY: points.probability, TOWER_ID: points.tower_id} | named
@@ -232,7 +251,7 @@ def write_points(prediction: SurveyPrediction, path: Path, out: str | Path) -> S
     dimensions = point_dimensions(prediction.geneos)
     reclassify = classify if prediction.settings.classify else None
     add_dimensions(path, out, dimensions, values, file.state, reclassify)
-    return replace(file, tower_points=in_tower)
+    return replace(file, towers=len(towers), tower_points=in_tower)
 
 
 def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> PredictionSummary:
@@ -250,7 +269,10 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         tiles=prediction.n_tiles,
         crs=None if crs is None else crs.to_string(),
         unit_sizes_m=list(prediction.unit_sizes),
-        warnings=[text for file in prediction.files for text in file.warnings],
+        warnings=[
+            *prediction.survey.notes,
+            *(text for file in prediction.files for text in file.warnings),
+        ],
         files=[file.to_json() for file in prediction.files],
         seconds=time.perf_counter() - prediction.started,
         settings=prediction.settings.model_dump() | detection,

@@ -20,9 +20,10 @@ from scenenet.figures.plots.point_clouds import View, side_views
 from scenenet.interpretability.explanations import TowerExplanation, explanations, meanings
 from scenenet.models.model_file import ModelCard
 from scenenet.pointcloud import iter_chunks
+from scenenet.prediction.file_status import readable
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.survey_files import SurveyFiles, look_at, readable
+from scenenet.prediction.survey_files import SurveyFiles, look_at
 from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section, Text, table, write
 from scenenet.report.page import render
 

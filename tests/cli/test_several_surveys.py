@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 
+import numpy as np
+import pyogrio
 import pytest
 
 
@@ -49,3 +51,45 @@ def test_bad_files_alone_are_named_one_by_one(call, tmp_path, pole_model):
     done = call("evaluate", *names, "--model", pole_model, "--codes", "edp")
     assert done.code == 1
     assert [f"{name}" in done.err for name in names] == [True, True]
+
+
+@pytest.fixture
+def index(three, tmp_path):
+    """A GeoPackage that lists the three surveys, and one that is not there."""
+    names = [*(path.name for path in three), "gone.laz"]
+    pyogrio.raw.write(
+        tmp_path / "index.gpkg", layer="tindex", driver="GPKG", geometry=None, geometry_type=None,
+        field_data=[np.array(names, object)], fields=["location"],
+    )  # fmt: skip
+    return tmp_path / "index.gpkg"
+
+
+def test_the_files_of_an_index_are_checked_one_by_one(call, index, three):
+    done = call("check", index, "--json")
+    assert done.code == 1
+    assert [report["survey"] for report in json.loads(done.out)] == ["field.laz", "good2.laz"]
+    errors = [line for line in done.err.splitlines() if line.startswith("error: ")]
+    assert ["bad.laz" in errors[0], "gone.laz" in errors[1], len(errors)] == [True, True, 2]
+    folder = call("check", three[0].parent, "--json")
+    assert folder.code == 1
+    assert len(json.loads(folder.out)) == 2
+
+
+def test_failed_files_of_an_index_give_the_exit_code_and_a_table(call, index, pole_model, tmp_path):
+    done = call("predict", index, "--model", pole_model, "--out", tmp_path / "out", "--json")
+    assert done.code == 1
+    assert "bad.laz" in done.err and "gone.laz" in done.err
+    status = (tmp_path / "out" / "index" / "status.csv").read_text().splitlines()
+    assert status[0] == "file,status,points,towers,tower_points,error"
+    assert [row.split(",")[:2] for row in status[1:]] == [
+        ["field.laz", "predicted"], ["bad.laz", "failed"], ["good2.laz", "predicted"],
+        ["gone.laz", "failed"],
+    ]  # fmt: skip
+
+
+def test_an_index_is_never_replaced(call, index, pole_model):
+    before = index.read_bytes()
+    done = call("predict", index, "--model", pole_model, "--out", index.parent, "--overwrite")
+    assert done.code == 1
+    assert "this file is an input" in done.err
+    assert index.read_bytes() == before

@@ -125,7 +125,7 @@ def test_each_file_is_written_under_its_name_and_the_lists_once(uncut, model, tm
     names = {
         path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.*")
     }
-    written = {f"tiles/{path.name}" for path in tiles.iterdir()}
+    written = {f"tiles/{path.name}" for path in tiles.iterdir()} | {"tiles/status.csv"}
     endings = ("gpkg", "summary.json", "towers.csv", "towers.geojson")
     assert names == written | {f"tiles.{ending}" for ending in endings}
 
@@ -161,6 +161,20 @@ def test_a_bad_file_is_named_and_stops_no_other(uncut, model, tmp_path):
     status = dict(zip(layer[0]["fields"], layer[3], strict=True))
     assert list(status["file"]) == [path.name for path in sorted(tiles.iterdir())]
     assert list(status["status"]) == ["failed"] + ["predicted"] * len(others)
+    with files.status.open(newline="") as stream:
+        table = list(csv.DictReader(stream))
+    assert table == [{name: str(value) for name, value in told[row["file"]].items()}
+                     for row in table]  # fmt: skip
+    assert [row["file"] for row in table] == list(status["file"])
+    for path in others:
+        numbers = np.asarray(laspy.read(files.points[path]).tower_id)
+        assert told[path.name]["towers"] == len(set(numbers.tolist()) - {0})
+        assert told[path.name]["tower_points"] == np.count_nonzero(numbers)
+    assert sum(told[path.name]["towers"] for path in others) > 0
+
+
+def test_a_survey_of_one_file_has_no_status_table(uncut, tmp_path):
+    assert PredictionFiles.of(SurveyFiles.of(uncut), tmp_path).status is None
 
 
 def test_a_file_in_another_system_is_left_out(uncut, model, tmp_path):
@@ -173,6 +187,7 @@ def test_a_file_in_another_system_is_left_out(uncut, model, tmp_path):
     write_las(last, PointCloud(cloud.xyz, cloud.classification, crs=pyproj.CRS(32630)))
     files = predict(tiles, model, tmp_path / "out")
     told = json.loads(files.summary.read_text())["files"][-1]
+    assert told["status"] == "left out"
     assert "WGS 84 / UTM zone 30N" in told["error"] and "zone 29N" in told["error"]
 
 
@@ -188,6 +203,7 @@ def test_a_later_prediction_replaces_the_files_of_an_earlier_one(uncut, model, t
     tiles = cut(uncut, tmp_path / "tiles", random_parts(uncut, 3))
     files = predict(tiles, model, tmp_path / "out")
     outputs = [*files.points.values(), *files.lists, files.summary]
+    assert files.status in outputs
     assert all(files.is_own(path) for path in outputs)
     edited = next(iter(files.points.values()))
     edited.write_bytes(edited.read_bytes() + b" ")

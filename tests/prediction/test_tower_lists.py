@@ -88,7 +88,7 @@ def test_the_coverage_holds_every_point_and_no_wide_gap(files, survey):
 def test_the_layer_of_tiles_names_the_file_and_its_status(files, survey):
     _, [extent], columns = layer(files, "tiles")
     assert {name: values[0] for name, values in columns.items()} == {
-        "file": "field.laz", "status": "predicted", "points": len(laspy.read(survey)),
+        "file": "field.laz", "status": "predicted", "points": len(laspy.read(survey)), "towers": 1,
         "tower_points": (laspy.read(*files.points.values())["tower_id"] > 0).sum(), "error": "",
     }  # fmt: skip
     assert extent.covers(shapely.Point(POLE))

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import json
-import sys
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from scenenet.cli.inputs import Failures
 from scenenet.cli.options import AsJson, Codes, Surveys
-from scenenet.core.errors import InputError
+
+if TYPE_CHECKING:
+    from scenenet.prediction.survey_files import SurveyFiles
 
 EXAMPLES = (
     "scenenet check line.laz",
@@ -30,21 +33,35 @@ def command(
     The report has the format, the CRS, the extent in m, the points per class and their density,
     and a warning for each fault.
 
-    The exit code is 1 if a survey cannot be read; the other surveys are still checked.
+    A folder of LAS and LAZ files, a pattern such as 'tiles/*.laz' in quotes and a tile index (.vpc,
+    STAC .json, .gpkg) give a report on each file.
+
+    The exit code is 1 if a file cannot be read; the others are still checked.
     """
+    from scenenet.core.errors import warn
     from scenenet.pointcloud.quality.check import check_survey
 
-    reports, errors = [], []
-    for survey in surveys:
-        try:
-            reports.append(check_survey(survey, None if codes is None else codes.value))
-        except InputError as error:
-            errors.append(error)
+    failures = Failures()
+    reports = []
+    for survey in failures.look_at(surveys, _files).values():
+        warn(survey.given, survey.notes)
+        failures.errors += survey.refused.values()
+        for path in survey.files:
+            if path not in survey.refused:
+                with failures.collect():
+                    reports.append(check_survey(path, None if codes is None else codes.value))
     if as_json:
         print(json.dumps([report.to_json() for report in reports], indent=2))
     else:
         print("\n\n".join(report.text() for report in reports))
-    for message in errors:
-        print(f"error: {message}", file=sys.stderr)
-    if errors:
-        raise typer.Exit(1)
+    failures.end()
+
+
+def _files(given: Path) -> SurveyFiles:
+    """The files of a survey; a folder of TS40K samples is checked as one."""
+    from scenenet.pointcloud.ts40k import SAMPLE_SUFFIXES
+    from scenenet.prediction.survey_files import SurveyFiles
+
+    if given.is_dir() and any(path.suffix in SAMPLE_SUFFIXES for path in given.iterdir()):
+        return SurveyFiles(given, given.name, (given,))
+    return SurveyFiles.of(given)

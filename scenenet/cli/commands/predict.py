@@ -55,14 +55,15 @@ def command(
 ) -> None:
     """Find the towers of surveys and classify every point.
 
-    A survey is a file, a folder of LAS and LAZ files, or a pattern such as 'tiles/*.laz' in quotes.
-    The files of a folder or pattern are one survey with one tower list, wherever it was cut.
+    A survey is a file, a folder of LAS and LAZ files, a pattern such as 'tiles/*.laz' in quotes, or
+    a tile index: a virtual point cloud (.vpc), a STAC item collection (.json) or a GeoPackage with
+    a column location. Several files are one survey with one tower list, wherever it was cut.
 
     Each survey NAME gives these files in the folder --out:
 
     NAME.laz: all points of the survey, in order, each with the probability of a tower, the id of
     its tower (0 for none) and the share of each GENEO. A survey of several files has a folder NAME
-    with a file for each.
+    with a file for each, and status.csv with a row for each.
 
     NAME.gpkg: the towers, the coverage and the file as layers, in the CRS of the survey, with
     styles for QGIS.
@@ -89,7 +90,7 @@ def command(
     named = failures.look_at(surveys, SurveyFiles.of)
     files = {given: PredictionFiles.of(survey, out) for given, survey in named.items()}
     outputs = [output for each in files.values() for output in each.outputs()]
-    inputs = [path for survey in named.values() for path in survey.files]
+    inputs = [path for survey in named.values() for path in (survey.given, *survey.files)]
     check_outputs(outputs, [*inputs, model], overwrite=overwrite)
     seen = failures.look_at(named, lambda given: look_at(named[given])[0])
     if seen:  # it loads torch, which takes seconds

@@ -15,6 +15,8 @@ from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.class_schemes import SCHEMES, difference
 
 if TYPE_CHECKING:
+    import pyproj
+
     from scenenet.dataset.voxels import VoxelSettings
     from scenenet.detection.settings import DetectionSettings
 
@@ -81,6 +83,15 @@ MinConductor = Annotated[
         "[default: 0.75]",
     ),
 ]
+System = Annotated[
+    str | None,
+    typer.Option(
+        "--crs",
+        metavar="SYSTEM",
+        help="Coordinate system of files that state none: EPSG:CODE, EPSG:CODE+CODE with heights, "
+        "or a file with WKT (.prj). A file that states another one is an error.",
+    ),
+]
 Resolution = Annotated[
     int,
     typer.Option(
@@ -107,6 +118,30 @@ def cube(resolution: int) -> VoxelSettings:
         known = ", ".join(map(str, _RESOLUTIONS))
         raise typer.BadParameter(f"must be one of {known}", param_hint="--resolution")
     return voxels.VoxelSettings(fit="cube", resolution=resolution)
+
+
+def coordinate_system(text: str | None) -> pyproj.CRS | None:
+    """The system of ``--crs``; None if the option is not given.
+
+    Raises:
+        typer.BadParameter: there is no such system, or it has no x and y.
+    """
+    if text is None:
+        return None
+    import pyproj
+
+    try:
+        file = Path(text)
+        crs = pyproj.CRS(file.read_text(encoding="utf-8") if file.is_file() else text)
+    except (pyproj.exceptions.CRSError, OSError, ValueError):
+        crs = None
+    if crs is None or len(crs.axis_info) < 2:
+        raise typer.BadParameter(
+            f"{text!r} is no coordinate system with x and y, such as EPSG:32629, and no file with "
+            "its WKT",
+            param_hint="--crs",
+        )
+    return crs
 
 
 def detection_settings(min_conductor: float | None) -> DetectionSettings:

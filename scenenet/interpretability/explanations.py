@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from scenenet.detection.conductor_rules import FAR
 from scenenet.detection.survey_tower import SurveyTower
@@ -12,6 +13,7 @@ from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard
+from scenenet.pointcloud.units import METRE, SYMBOLS
 
 NEGLIGIBLE = 0.01
 """Absolute share of a GENEO below which the explanation does not state its side."""
@@ -26,8 +28,9 @@ class TowerExplanation:
 
     Attributes:
         id: number in the tower list.
-        x, y: m, in the CRS of the survey.
-        height: m above the ground at its foot.
+        x, y: in the CRS and the units of the survey.
+        height: above the ground at its foot, in the unit of its heights.
+        unit, vertical_unit: names of these units.
         probability: highest probability of its voxels.
         evidence: measurements at its position, independent of the model.
         contributions: (GENEO, share, sentence), the largest first. Positive shares support a
@@ -39,35 +42,67 @@ class TowerExplanation:
     x: float
     y: float
     height: float
+    unit: str
+    vertical_unit: str
     probability: float
     evidence: tuple[str, ...]
     contributions: tuple[tuple[str, float, str], ...]
     doubts: tuple[str, ...]
 
 
-def explanations(towers: Iterable[SurveyTower], card: ModelCard) -> list[TowerExplanation]:
-    """An explanation of every tower of a survey.
+def explanations(
+    towers: Iterable[SurveyTower],
+    card: ModelCard,
+    unit_sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    unit_names: tuple[str, str, str] = (METRE, METRE, METRE),
+) -> list[TowerExplanation]:
+    """An explanation of every tower of a survey, in the units of the survey.
 
     The contributions are empty for a model without GENEOs.
+
+    Args:
+        unit_sizes, unit_names: sizes in m of the units of x, y and z, and their names.
     """
-    return [_explanation(tower, card) for tower in towers]
+    units = _Units(*unit_sizes[1:], *unit_names[1:])
+    return [_explanation(tower, card, units) for tower in towers]
 
 
-def _explanation(tower: SurveyTower, card: ModelCard) -> TowerExplanation:
+class _Units(NamedTuple):
+    """Sizes in m of the units in plan and of heights, and their names."""
+
+    planar_m: float
+    vertical_m: float
+    planar_name: str
+    vertical_name: str
+
+    @property
+    def planar(self) -> str:
+        """What follows a length in plan."""
+        return SYMBOLS.get(self.planar_name, self.planar_name)
+
+    @property
+    def vertical(self) -> str:
+        """What follows a height."""
+        return SYMBOLS.get(self.vertical_name, self.vertical_name)
+
+
+def _explanation(tower: SurveyTower, card: ModelCard, units: _Units) -> TowerExplanation:
     shares = sorted(tower.contributions.items(), key=lambda item: -abs(item[1]))
     return TowerExplanation(
         tower.id,
         tower.x,
         tower.y,
         tower.height,
+        units.planar_name,
+        units.vertical_name,
         tower.probability,
-        _evidence(tower),
+        _evidence(tower, units),
         tuple((name, share, _sentence(share)) for name, share in shares),
-        _doubts(tower, card.tau),
+        _doubts(tower, card.tau, units),
     )
 
 
-def _evidence(tower: SurveyTower) -> tuple[str, ...]:
+def _evidence(tower: SurveyTower, units: _Units) -> tuple[str, ...]:
     """The measurements of a tower, in words."""
     bearings = sorted(tower.conductor_bearings)
     conductors = "no conductors were found that leave it"
@@ -75,20 +110,22 @@ def _evidence(tower: SurveyTower) -> tuple[str, ...]:
         towards = " and ".join(f"{bearing:.0f}°" for bearing in bearings)
         conductors = f"conductors leave its head at bearings of {towards} from north"
     return (
-        f"it is {tower.height:.0f} m tall, on ground at {tower.base:.0f} m",
-        f"its body is {tower.width:.0f} m wide where nothing touches it",
+        f"it is {tower.height:.0f} {units.vertical} tall, on ground at {tower.base:.0f} "
+        f"{units.vertical}",
+        f"its body is {tower.width:.0f} {units.planar} wide where nothing touches it",
         conductors,
     )
 
 
-def _doubts(tower: SurveyTower, tau: float | None) -> tuple[str, ...]:
+def _doubts(tower: SurveyTower, tau: float | None, units: _Units) -> tuple[str, ...]:
     doubts = []
-    if tower.edge_distance < tower.height:
+    to_edge = tower.edge_distance * units.planar_m
+    if to_edge < tower.height * units.vertical_m:
         doubts.append(
-            f"it is {tower.edge_distance:.0f} m from the edge of the data, less than its height: "
-            "part of it may be missing"
+            f"it is {tower.edge_distance:.0f} {units.planar} from the edge of the data, less than "
+            "its height: part of it may be missing"
         )
-    if tower.conductor_directions == 1 and tower.edge_distance >= FAR:
+    if tower.conductor_directions == 1 and to_edge >= FAR:
         doubts.append("conductors leave it in one direction only: the end of a line, or no tower")
     if tau is not None and tower.probability < tau:
         doubts.append(

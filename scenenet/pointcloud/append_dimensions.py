@@ -13,6 +13,7 @@ import numpy as np
 from scenenet.core.errors import InputError
 from scenenet.core.unchanged import FileState, unchanged
 from scenenet.pointcloud.file_kinds import kind_of
+from scenenet.pointcloud.las.crs import USERS, WKT_RECORD, crs_records, states_system
 from scenenet.pointcloud.las.extra_dimensions import OWN_MARK, Dimension, checked, new_dimensions
 from scenenet.pointcloud.las.header import CheckedHeader, Vlr, read_header
 from scenenet.pointcloud.las.records import coordinates, iter_records
@@ -21,6 +22,7 @@ from scenenet.pointcloud.reading import read
 
 if TYPE_CHECKING:
     import laspy
+    import pyproj
 
 CHUNK_POINTS = 500_000
 REWRITTEN = {("LASF_Spec", 4), ("laszip encoded", 22204)}
@@ -47,6 +49,7 @@ def add_dimensions(
     values: Values,
     state: FileState | None = None,
     classify: Classify | None = None,
+    crs: pyproj.CRS | None = None,
 ) -> int:
     """Write a copy of a survey, with all of its points and content, and further dimensions.
 
@@ -64,6 +67,7 @@ def add_dimensions(
         state: of the survey when ``values`` was made; None for now. Another state is an error,
             and ``target`` stays as it was.
         classify: gives each point its class code; None to keep all codes.
+        crs: written if the survey has no record of a system at all.
 
     Returns:
         the number of points.
@@ -85,12 +89,14 @@ def add_dimensions(
             arrays = checked(values(cloud.xyz), dimensions, len(cloud))
         if classify is not None:
             cloud = replace(cloud, classification=classify(arrays, cloud.classification))
+        if crs is not None:
+            cloud = replace(cloud, crs=crs)
         write_cloud(target, cloud, dimensions, arrays, 0.001)
         return len(cloud)
     with unchanged(state):
         header = read_header(source)
     channels: set[int] = set()
-    with open_writer(target, _extended(header, dimensions)) as writer, unchanged(state):
+    with open_writer(target, _extended(header, dimensions, crs)) as writer, unchanged(state):
         for records in iter_records(header, CHUNK_POINTS):
             if writer.header.point_format.id in MIXED_UP_FORMATS:
                 channels.update(np.unique(records["scanner_channel"]).tolist())
@@ -124,8 +130,11 @@ def _widened(
     return points
 
 
-def _extended(header: CheckedHeader, dimensions: list[laspy.ExtraBytesParams]) -> laspy.LasHeader:
-    """The header of the new file: that of the survey with the new dimensions."""
+def _extended(
+    header: CheckedHeader, dimensions: list[laspy.ExtraBytesParams], crs: pyproj.CRS | None
+) -> laspy.LasHeader:
+    """The header of the new file: that of the survey with the new dimensions, and with the system
+    if it has none."""
     import laspy
 
     _check_can_be_kept(header, {d.name for d in dimensions})
@@ -160,6 +169,11 @@ def _extended(header: CheckedHeader, dimensions: list[laspy.ExtraBytesParams]) -
         for v in header.vlrs
         if (v.user_id, v.record_id) not in REWRITTEN and not _is_octree(header, v.user_id)
     ]
+    if crs is not None and not states_system(header.records):
+        records = crs_records(crs, new.point_format.id)
+        new.vlrs.extend([laspy.VLR(USERS[0], number, "", data) for number, data in records])
+        is_wkt = records[0][0] == WKT_RECORD
+        new.global_encoding.wkt = is_wkt and new.version.minor >= 4  # reserved before
     for record in new.vlrs.get("ExtraBytesVlr"):  # laspy loses the "no data" value too
         record.extra_bytes_structs = [
             entry if entry.format_name() in {d.name for d in dimensions}

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenenet.core.errors import in_file
 from scenenet.pointcloud.class_schemes import class_scheme
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.file_kinds import kind_of
-from scenenet.pointcloud.las.crs import CrsRecord, read_crs
+from scenenet.pointcloud.las.crs import CrsRecord, read_crs, with_system
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
 from scenenet.pointcloud.true_classes import ROUNDING_M, check_same_number, with_true_classes
 from scenenet.pointcloud.ts40k import read_sample
-from scenenet.pointcloud.units import NotMetres, not_metres, sizes
+from scenenet.pointcloud.units import NotMetres, not_metres, sizes, unit_name
 
 if TYPE_CHECKING:
     import pyproj
@@ -66,19 +67,40 @@ class SurveyInfo:
         return sizes(self.record)
 
     @property
+    def unit_names(self) -> tuple[str, str, str]:
+        """Names of the units of x, y and z (``scenenet.pointcloud.units.unit_name``)."""
+        planar, vertical = self.record.planar, self.record.vertical
+        return unit_name(planar), unit_name(planar), unit_name(vertical or planar)
+
+    @property
     def not_metres(self) -> NotMetres | None:
         """Why the coordinates are known not to be metres, else None."""
         box = (self.mins, self.maxs) if self.n_points else ((np.nan,) * 3, (np.nan,) * 3)
         return not_metres(self.record, *box, self.scales)
 
 
-def survey_info(path: str | Path) -> SurveyInfo:
+def survey_info(path: str | Path, crs: pyproj.CRS | None = None) -> SurveyInfo:
     """The header of a survey; no point of a LAS, LAZ or COPC file is decoded.
 
+    Args:
+        crs: the system of the survey if the file states none; None if it is not known.
+
     Raises:
-        InputError: the file is missing, not a point cloud, or its header contradicts its size.
+        InputError: the file is missing, not a point cloud, or its header contradicts its size. It
+            states another system than ``crs``, or its coordinates look like degrees and those of
+            ``crs`` are lengths.
     """
-    path = Path(path)
+    info = _header_of(Path(path))
+    if crs is None:
+        return info
+    if not crs.is_geographic and (reason := info.not_metres) and reason.guessed:
+        raise reason.error(path)
+    with in_file(path):
+        return replace(info, record=with_system(info.record, crs))
+
+
+def _header_of(path: Path) -> SurveyInfo:
+    """The header of a survey as it is in the file."""
     kind = kind_of(path)
     if kind != "las":
         xyz, _ = read_sample(path, kind)
@@ -119,13 +141,16 @@ def survey_in_metres(path: str | Path) -> SurveyInfo:
     return info
 
 
-def survey_of_lengths(path: str | Path) -> SurveyInfo:
+def survey_of_lengths(path: str | Path, crs: pyproj.CRS | None = None) -> SurveyInfo:
     """The header of a survey whose coordinates are lengths, in metres or a unit that it states.
+
+    Args:
+        crs: as ``survey_info``.
 
     Raises:
         InputError: as ``survey_info``, and if the coordinates are no lengths.
     """
-    info = survey_info(path)
+    info = survey_info(path, crs)
     if (reason := info.not_metres) and not reason.is_length:
         raise reason.error(path)
     return info

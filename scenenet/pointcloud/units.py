@@ -20,6 +20,11 @@ degrees are 200 km, but no survey is 2 m wide."""
 STEEP = 300.0
 """A narrow survey that is this many times as high as wide is in degrees: one degree is about
 100 km. The points of a single pole are at most 100 times as high as wide."""
+METRE = "metre"
+KNOWN = {METRE: 1.0, "foot": 0.3048, "US survey foot": 1200 / 3937}
+"""Unit of length -> its size in m."""
+SYMBOLS = {METRE: "m", "foot": "ft", "US survey foot": "US survey ft"}
+"""Unit -> what follows a number; others have their name."""
 REPROJECT = (
     "Reproject it to a system with metres on all axes first "
     "(pdal translate --filter filters.reprojection)"
@@ -34,12 +39,14 @@ class NotMetres(NamedTuple):
         place: what states it; None if the numbers show it.
         remedy: what the user can do.
         is_length: whether they are in another unit of length, which can be converted.
+        guessed: whether only the numbers show it, and the file states nothing.
     """
 
     problem: str
     place: str | None
     remedy: str
     is_length: bool = False
+    guessed: bool = False
 
     def error(self, file: object) -> InputError:
         return InputError(self.problem, file=str(file), place=self.place, remedy=self.remedy)
@@ -78,6 +85,7 @@ def not_metres(
             None,
             f"{REPROJECT}. If they are metres, write them with their coordinate system, or in "
             "steps of 0.001 m",
+            guessed=True,
         )
     return None
 
@@ -97,6 +105,14 @@ def sizes(record: CrsRecord) -> tuple[float, float, float]:
     planar = 1.0 if record.planar is None else record.planar.metres
     vertical = planar if record.vertical is None else record.vertical.metres
     return planar, planar, vertical
+
+
+def unit_name(unit: Unit | None) -> str:
+    """Name of a unit of length as in ``KNOWN``, else as the file calls it; the metre if unknown."""
+    if unit is None:
+        return METRE
+    same = (name for name, metres in KNOWN.items() if abs(unit.metres - metres) < 1e-9)
+    return next(same, unit.name)
 
 
 def look_like_degrees(

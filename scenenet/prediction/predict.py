@@ -49,7 +49,7 @@ class SurveyPrediction:
         model, card: the model and what its file says about it.
         settings, detection: the settings of the prediction.
         crs: CRS of the survey; None where its files name none.
-        unit_sizes: sizes in m of the units of its x, y and z.
+        unit_sizes, unit_names: sizes in m of the units of its x, y and z, and their names.
         n_tiles: tiles of voxels that hold a point.
         voxel_size: m.
         towers: the towers found, highest probability first, in the units of the survey.
@@ -65,6 +65,7 @@ class SurveyPrediction:
     detection: DetectionSettings
     crs: pyproj.CRS | None
     unit_sizes: tuple[float, float, float]
+    unit_names: tuple[str, str, str]
     n_tiles: int
     voxel_size: float
     towers: tuple[SurveyTower, ...]
@@ -154,6 +155,7 @@ def predict_survey(
             detection=detection,
             crs=info.crs,
             unit_sizes=info.unit_sizes,
+            unit_names=info.unit_names,
             n_tiles=len(spool),
             voxel_size=voxel_size,
             towers=tuple(tower.in_units(info.unit_sizes) for tower in found),

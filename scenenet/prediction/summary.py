@@ -25,6 +25,7 @@ class PredictionSummary:
         tiles: number of tiles that hold a point.
         crs: CRS of the survey; None where the file names none.
         unit_sizes_m: sizes of the units of x, y and z, m; results are in these units.
+        units: names of these units.
         warnings: what looks wrong about the survey, as sentences.
         files: of each file what ``SurveyFile.to_json`` gives.
         seconds: time of the prediction, files included, s.
@@ -44,6 +45,7 @@ class PredictionSummary:
     tiles: int
     crs: str | None
     unit_sizes_m: list[float]
+    units: list[str]
     warnings: list[str]
     files: list[dict[str, Any]]
     seconds: float

@@ -7,11 +7,16 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from scenenet.core.errors import InputError
+from scenenet.pointcloud.las.crs import same_system
 from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
 from scenenet.prediction.file_status import LeftOut
 from scenenet.prediction.tile_index import INDEX_SUFFIXES, SUFFIXES, read_index
+
+if TYPE_CHECKING:
+    import pyproj
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,7 @@ class SurveyFiles:
             no other.
         refused: the files that cannot be opened, with the reason, such as the URLs of an index.
         notes: what looks wrong about the list of files, as sentences.
+        crs: the system of files that state none; None if it is not known.
     """
 
     given: Path
@@ -34,9 +40,10 @@ class SurveyFiles:
     tiled: bool = False
     refused: Mapping[Path, InputError] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    crs: pyproj.CRS | None = None
 
     @classmethod
-    def of(cls, given: str | Path) -> SurveyFiles:
+    def of(cls, given: str | Path, crs: pyproj.CRS | None = None) -> SurveyFiles:
         """The survey that is a file, or the LAS and LAZ files of a folder, a pattern or an index.
 
         Whether a single file exists is not looked at.
@@ -48,7 +55,7 @@ class SurveyFiles:
         if given.suffix.lower() in INDEX_SUFFIXES and given.is_file():
             index = read_index(given)
             files = (*index.files, *index.refused)
-            return cls(given, given.stem, files, True, index.refused, index.notes)
+            return cls(given, given.stem, files, True, index.refused, index.notes, crs)
         if given.is_dir():
             found = [path for path in given.iterdir() if path.suffix.lower() in SUFFIXES]
             name = given.resolve().name
@@ -57,7 +64,7 @@ class SurveyFiles:
             found = [path for path in matches if path.suffix.lower() in SUFFIXES]
             name = next(p for p in given.parents if not glob.has_magic(str(p))).resolve().name
         else:
-            return cls(given, result_stem(given), (given,))
+            return cls(given, result_stem(given), (given,), crs=crs)
         if not found:
             raise InputError(
                 "there is no LAS or LAZ file in it",
@@ -65,7 +72,7 @@ class SurveyFiles:
                 remedy="Name a survey file, a folder of tiles, a pattern such as 'tiles/*.laz', or "
                 "a tile index",
             )
-        return cls(given, name, tuple(sorted(found)), tiled=True)
+        return cls(given, name, tuple(sorted(found)), tiled=True, crs=crs)
 
     @property
     def names(self) -> Mapping[Path, str]:
@@ -100,7 +107,7 @@ def look_at(survey: SurveyFiles) -> tuple[dict[Path, SurveyInfo], dict[Path, Inp
         if path in errors:
             continue
         try:
-            info = survey_of_lengths(path)
+            info = survey_of_lengths(path, survey.crs)
             _check_system(info, next(iter(headers.values()), info), path)
             headers[path] = info
         except InputError as error:
@@ -123,7 +130,7 @@ def nothing_to_use(survey: SurveyFiles, errors: Sequence[InputError]) -> InputEr
 
 def _check_system(info: SurveyInfo, first: SurveyInfo, path: Path) -> None:
     """Leave out a file in another CRS than the first one."""
-    if (info.crs, info.unit_sizes) != (first.crs, first.unit_sizes):
+    if not same_system(info.crs, first.crs) or info.unit_sizes != first.unit_sizes:
         ours, theirs = (i.crs.name if i.crs else "no CRS" for i in (first, info))
         raise LeftOut(
             f"the file has {theirs}, and the files before it have {ours}",

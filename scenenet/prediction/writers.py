@@ -250,7 +250,7 @@ def write_points(prediction: SurveyPrediction, path: Path, out: str | Path) -> S
 
     dimensions = point_dimensions(prediction.geneos)
     reclassify = classify if prediction.settings.classify else None
-    add_dimensions(path, out, dimensions, values, file.state, reclassify)
+    add_dimensions(path, out, dimensions, values, file.state, reclassify, prediction.survey.crs)
     return replace(file, towers=len(towers), tower_points=in_tower)
 
 
@@ -269,6 +269,7 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         tiles=prediction.n_tiles,
         crs=None if crs is None else crs.to_string(),
         unit_sizes_m=list(prediction.unit_sizes),
+        units=list(prediction.unit_names),
         warnings=[
             *prediction.survey.notes,
             *(text for file in prediction.files for text in file.warnings),

@@ -20,8 +20,9 @@ from scenenet.figures.plots.point_clouds import View, side_views
 from scenenet.interpretability.explanations import TowerExplanation, explanations, meanings
 from scenenet.models.model_file import ModelCard
 from scenenet.pointcloud import iter_chunks
+from scenenet.pointcloud.units import METRE, SYMBOLS
 from scenenet.prediction.file_status import readable
-from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
+from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, in_metres, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
 from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section, Text, table, write
@@ -47,7 +48,7 @@ def is_explanation(path: Path) -> bool:
 
 
 def explain_survey(
-    survey: str | Path,
+    survey: str | Path | SurveyFiles,
     model: str | Path,
     out: str | Path,
     settings: PredictSettings,
@@ -56,7 +57,8 @@ def explain_survey(
     """Predict a survey and write a page with the explanation and a picture of every tower.
 
     Args:
-        survey: LAS, LAZ, COPC or TS40K sample.
+        survey: LAS, LAZ, COPC or TS40K sample; a folder, a pattern or a tile index of LAS and LAZ
+            files.
         model: model file with tau.
         out: HTML file to write; it needs no other file and no network.
 
@@ -64,10 +66,9 @@ def explain_survey(
         InputError: the survey or the model cannot be used.
         OutputError: the page cannot be written, or a disk has too little space.
     """
-    headers, _ = look_at(SurveyFiles.of(survey))
-    for path, info in headers.items():
-        if reason := info.not_metres:  # the page is in metres
-            raise reason.error(path)
+    if not isinstance(survey, SurveyFiles):
+        survey = SurveyFiles.of(survey)
+    headers, _ = look_at(survey)
     points = sum(info.n_points for info in headers.values())
     page = FIRST_TOWER_BYTES + POINT_BYTES * points
     # The pictures are drawn to temporary files.
@@ -75,7 +76,8 @@ def explain_survey(
     with predict_survey(survey, model, settings, detection) as prediction:
         prediction.warn()
         card = prediction.card
-        explained = explanations(prediction.towers, card)
+        units = (prediction.unit_sizes, prediction.unit_names)
+        explained = explanations(prediction.towers, card, *units)
         with unchanged(*prediction.states):
             surroundings = list(_surroundings(prediction, explained))
     facts = [
@@ -86,12 +88,12 @@ def explain_survey(
         ("voxel size [m]", write(prediction.voxel_size, "metres")),
     ]
     blocks = [Facts(facts), *_parameters(meanings(prediction.model, card))]
-    sections = [Section("survey", Path(survey).name, blocks)]
+    sections = [Section("survey", survey.given.name, blocks)]
     with scratch_folder() as scratch:
         for explanation, (xyz, views) in zip(explained, surroundings, strict=True):
             picture = scratch / f"{explanation.id}.png"
             sections.append(_section(explanation, xyz, views, picture))
-        title = f"Why these are towers: {Path(survey).name}"
+        title = f"Why these are towers: {survey.given.name}"
         write_text(out, render(sections, title, GENERATOR, made_by=_origin(card)))
     return explained
 
@@ -131,10 +133,13 @@ def _parameters(rows: list[tuple[str, float, str, str]]) -> list[Block]:
 def _section(
     explanation: TowerExplanation, xyz: np.ndarray, views: list[View], picture: Path
 ) -> Section:
+    planar, vertical = (
+        SYMBOLS.get(name, name) for name in (explanation.unit, explanation.vertical_unit)
+    )
     facts = [
-        ("x [m]", f"{explanation.x:.2f}"),
-        ("y [m]", f"{explanation.y:.2f}"),
-        ("height [m]", f"{explanation.height:.1f}"),
+        (f"x [{planar}]", f"{explanation.x:.2f}"),
+        (f"y [{planar}]", f"{explanation.y:.2f}"),
+        (f"height [{vertical}]", f"{explanation.height:.1f}"),
         ("probability", write(explanation.probability, "score")),
     ]
     blocks: list[Block] = [Facts(facts), Notes("Measurements", explanation.evidence)]
@@ -155,6 +160,8 @@ def _section(
             "The tower and its surroundings from the side: the probability of each point, and how "
             "much each GENEO contributed in favour of a tower."
         )
+        if (explanation.unit, explanation.vertical_unit) != (METRE, METRE):
+            caption += " Its axes are in m."
         title = f"Tower {explanation.id}"
         blocks.append(Figure(Picture(picture, title, alt, caption, "explanation")))
     return Section(f"tower-{explanation.id}", f"Tower {explanation.id}", blocks)
@@ -164,14 +171,17 @@ def _surroundings(
     prediction: SurveyPrediction, towers: Sequence[TowerExplanation]
 ) -> Iterator[tuple[np.ndarray, list[View]]]:
     """For each tower the points (n, 3) m within its height in plan, and the views of them."""
+    sizes = prediction.unit_sizes
+    planar, _, vertical = sizes
     kept: list[list[np.ndarray]] = [[np.empty((0, 4 + len(prediction.geneos)))] for _ in towers]
     chunks = chain.from_iterable(iter_chunks(file.path) for file, _ in readable(prediction.files))
     for chunk in track(chunks, "pictures: chunks read"):
         for tower, parts in zip(towers, kept, strict=True):
-            apart = np.hypot(chunk.xyz[:, 0] - tower.x, chunk.xyz[:, 1] - tower.y)
-            xyz = chunk.xyz[apart <= tower.height]
+            apart = np.hypot(chunk.xyz[:, 0] - tower.x, chunk.xyz[:, 1] - tower.y) * planar
+            xyz = chunk.xyz[apart <= tower.height * vertical]
             points = prediction.look_up(xyz)
-            parts.append(np.column_stack([xyz, points.probability, points.shares]))
+            places = in_metres(xyz, sizes)
+            parts.append(np.column_stack([places, points.probability, points.shares]))
     for parts in kept:
         rows = np.concatenate(parts)
         rows = rows[:: max(1, len(rows) // POINTS_PER_PICTURE)]

@@ -22,8 +22,8 @@ def explain(pole_finder):
     """A function that explains ``TOWER`` with some of its columns changed."""
     _, card = pole_finder
 
-    def make(**changes) -> TowerExplanation:
-        [one] = explanations([replace(TOWER, **changes)], card)
+    def make(*units, **changes) -> TowerExplanation:
+        [one] = explanations([replace(TOWER, **changes)], card, *units)
         return one
 
     return make
@@ -64,3 +64,29 @@ def test_each_doubtful_measurement_is_named(explain, changes, words):
 def test_conductors_cut_off_by_the_edge_of_the_data_raise_no_second_doubt(explain):
     one_side = explain(**ONE_SIDE, edge_distance=5.0)
     assert not any("one direction" in doubt for doubt in one_side.doubts)
+
+
+FOOT = 0.3048
+MIXED = ((1.0, 1.0, FOOT), ("metre", "metre", "foot"))
+FEET = ((FOOT, FOOT, FOOT), ("US survey foot",) * 3)
+
+
+def test_lengths_are_named_in_the_units_of_the_survey(explain):
+    mixed, feet = explain(*MIXED), explain(*FEET)
+    assert (mixed.unit, mixed.vertical_unit) == ("metre", "foot")
+    assert "21 ft tall, on ground at 104 ft" in mixed.evidence[0]
+    assert "2 m wide" in mixed.evidence[1]
+    assert "21 US survey ft tall" in feet.evidence[0]
+    assert "2 US survey ft wide" in feet.evidence[1]
+    assert explain().unit == "metre"
+
+
+def test_units_do_not_change_the_doubts(explain):
+    # 12 m from the edge, and 21.4 ft are 6.5 m.
+    assert explain(*MIXED, edge_distance=12.0).doubts == ()
+    [doubt] = explain(*FEET, edge_distance=12.0).doubts
+    assert "12 US survey ft from the edge" in doubt
+    # The edge is 50 ft away, nearer than the 20 m in which conductors must be seen.
+    tall = {"height": 10.0, "edge_distance": 50.0}
+    assert explain(*FEET, **ONE_SIDE, **tall).doubts == ()
+    assert "one direction" in explain(**ONE_SIDE, **tall).doubts[0]

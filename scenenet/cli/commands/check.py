@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenenet.cli.inputs import Failures
-from scenenet.cli.options import AsJson, Codes, Surveys
+from scenenet.cli.options import AsJson, Codes, Surveys, System, coordinate_system
 
 if TYPE_CHECKING:
     from scenenet.prediction.survey_files import SurveyFiles
@@ -26,6 +26,7 @@ def command(
         Codes | None,
         typer.Option(help="Class scheme, to name the classes. Without it, only codes are shown."),
     ] = None,
+    crs: System = None,
     as_json: AsJson = False,
 ) -> None:
     """Report what surveys contain and what is wrong with them.
@@ -41,6 +42,8 @@ def command(
     from scenenet.core.errors import warn
     from scenenet.pointcloud.quality.check import check_survey
 
+    system = coordinate_system(crs)
+    scheme = None if codes is None else codes.value
     failures = Failures()
     reports = []
     for survey in failures.look_at(surveys, _files).values():
@@ -49,7 +52,7 @@ def command(
         for path in survey.files:
             if path not in survey.refused:
                 with failures.collect():
-                    reports.append(check_survey(path, None if codes is None else codes.value))
+                    reports.append(check_survey(path, scheme, crs=system))
     if as_json:
         print(json.dumps([report.to_json() for report in reports], indent=2))
     else:

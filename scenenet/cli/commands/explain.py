@@ -14,6 +14,8 @@ from scenenet.cli.options import (
     ModelFile,
     Overwrite,
     Survey,
+    System,
+    coordinate_system,
     detection_settings,
 )
 from scenenet.cli.output import show
@@ -26,6 +28,7 @@ def command(
     model: ModelFile,
     out: Annotated[Path, typer.Option("--out", help="Page to write (.html).")],
     min_conductor: MinConductor = None,
+    crs: System = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
@@ -42,13 +45,16 @@ def command(
 
     require("report", "scenenet explain")  # before the prediction, which takes minutes
     from scenenet.core.outputs import Output, check_outputs
+    from scenenet.prediction.survey_files import SurveyFiles
     from scenenet.report.explanation_page import explain_survey, is_explanation
 
     if out.suffix.lower() not in (".html", ".htm"):
         raise typer.BadParameter("an explanation is an .html file", param_hint="--out")
-    check_outputs([Output(out, is_explanation)], [survey, model], overwrite=overwrite)
+    named = SurveyFiles.of(survey, coordinate_system(crs))
+    inputs = [survey, *named.files, model]
+    check_outputs([Output(out, is_explanation)], inputs, overwrite=overwrite)
     detection = detection_settings(min_conductor)
-    found = explain_survey(survey, model, out, PredictSettings(), detection)
+    found = explain_survey(named, model, out, PredictSettings(), detection)
     show(
         [asdict(explanation) for explanation in found],
         as_json,

@@ -14,6 +14,8 @@ from scenenet.cli.options import (
     ModelFile,
     Overwrite,
     Surveys,
+    System,
+    coordinate_system,
     detection_settings,
 )
 from scenenet.cli.output import show
@@ -36,6 +38,7 @@ def command(
         ),
     ] = None,
     min_conductor: MinConductor = None,
+    crs: System = None,
     classify: Annotated[
         bool,
         typer.Option(
@@ -86,8 +89,9 @@ def command(
     settings = PredictSettings(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
     )
+    system = coordinate_system(crs)
     failures = Failures()
-    named = failures.look_at(surveys, SurveyFiles.of)
+    named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
     files = {given: PredictionFiles.of(survey, out) for given, survey in named.items()}
     outputs = [output for each in files.values() for output in each.outputs()]
     inputs = [path for survey in named.values() for path in (survey.given, *survey.files)]

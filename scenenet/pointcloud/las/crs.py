@@ -10,9 +10,11 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
+
+from scenenet.core.errors import InputError
 
 if TYPE_CHECKING:
     import pyproj
@@ -23,10 +25,14 @@ USERS = ("LASF_Projection", "liblas")
 WKT_RECORD, KEYS_RECORD, DOUBLES_RECORD = 2112, 34735, 34736
 GEOGRAPHIC, PROJECTED, VERTICAL = 2048, 3072, 4096
 """GeoTIFF keys with the EPSG code of a system."""
+MODEL, PROJECTED_MODEL = 1024, 1
+"""GeoTIFF key of the kind of system, and its value for a projected one."""
 PLANAR_UNIT, PLANAR_UNIT_SIZE, VERTICAL_UNIT = 3076, 3077, 4099
 """GeoTIFF keys with the EPSG code of a unit, or its size in metres."""
 USER_DEFINED = 32767
 EPSG_SYSTEMS = range(1024, USER_DEFINED)
+SAME_UNIT = 1e-9
+"""Largest relative difference of the sizes of one unit; the two feet differ by 2e-6."""
 FEET_IN_WKT = re.compile(r'UNIT\s*\[\s*"([^"]*(?:foot|feet|ft)[^"]*)"\s*,\s*([0-9.]+)', re.I)
 VERTICAL_IN_WKT = re.compile(r"VERT(?:_CS|CS|CRS|ICALCRS)\s*\[", re.I)
 
@@ -58,12 +64,14 @@ class CrsRecord:
         problems: why a record gave no system or no unit, as sentences.
         planar: unit of x and y; None for degrees or if unknown.
         vertical: unit of z; None if the file does not state it.
+        given: whether the system is not from the file but from the user (``with_system``).
     """
 
     crs: pyproj.CRS | None = None
     problems: tuple[str, ...] = ()
     planar: Unit | None = None
     vertical: Unit | None = None
+    given: bool = False
 
 
 def read_crs(records: Iterable[Vlr]) -> CrsRecord:
@@ -83,6 +91,91 @@ def read_crs(records: Iterable[Vlr]) -> CrsRecord:
         return CrsRecord(named.crs, (), named.planar, vertical)
     planar = next((record.planar for record in found if record.planar), None)
     return CrsRecord(None, tuple(dict.fromkeys(problems)), planar, vertical)
+
+
+def with_system(record: CrsRecord, given: pyproj.CRS) -> CrsRecord:
+    """A record, completed by the system that the user names where the file states none.
+
+    A file that states a system without heights takes those of a compound system with the same
+    plan.
+
+    Raises:
+        InputError: the file states another system or unit.
+    """
+    named = _of_crs(given, f"CRS {given.name}")
+    if record.crs is not None:
+        same = same_system(record.crs, given) or (
+            same_system(record.crs.to_2d(), given.to_2d())
+            and (named.vertical is None or record.vertical is None)
+        )
+        if not same:
+            raise _contradicts(given, record.crs.name)
+        if named.vertical is None or record.vertical is not None:
+            return record
+    for unit, other in ((record.planar, named.planar), (record.vertical, named.vertical)):
+        if unit and other and abs(unit.metres / other.metres - 1) > SAME_UNIT:
+            raise _contradicts(given, f"the {unit.name} as unit ({unit.source})")
+    return replace(
+        record,
+        crs=given,
+        planar=named.planar or record.planar,
+        vertical=named.vertical or record.vertical,
+        given=True,
+    )
+
+
+def same_system(one: pyproj.CRS | None, other: pyproj.CRS | None) -> bool:
+    """Whether two files have the same system; WKT of different versions spells it differently."""
+    if one is None or other is None:
+        return one is other
+    if one == other:
+        return True
+    code = one.to_epsg()
+    if code is not None and code == other.to_epsg():
+        return True
+    import pyproj
+
+    # A system that was stored as WKT 1 has lost the order of its axes, and with it its code.
+    plain, other_plain = (pyproj.CRS.from_wkt(_wkt(crs)) for crs in (one, other))
+    return bool(plain == other_plain)
+
+
+def _contradicts(given: pyproj.CRS, stated: str) -> InputError:
+    return InputError(
+        f"the file states {stated}, and --crs names {given.name}; what a file states is never "
+        "overridden",
+        remedy="Leave --crs out for this file, or correct its record first",
+    )
+
+
+def crs_records(crs: pyproj.CRS, point_format: int) -> list[tuple[int, bytes]]:
+    """The record of a system for a file of a point format, as (record id, content).
+
+    Point formats 6 to 10 require WKT. For the others, readers expect GeoTIFF keys, which need EPSG
+    codes; a system without them is written as WKT too.
+    """
+    parts = crs.sub_crs_list or [crs]
+    codes = [part.to_epsg() for part in parts]
+    if point_format >= 6 or None in codes or not parts[0].is_projected:
+        return [(WKT_RECORD, _wkt(crs).encode() + b"\0")]
+    keys = [(MODEL, PROJECTED_MODEL), *zip((PROJECTED, VERTICAL), codes, strict=False)]
+    entries = b"".join(struct.pack("<4H", key, 0, 1, value) for key, value in keys)
+    return [(KEYS_RECORD, struct.pack("<4H", 1, 1, 0, len(keys)) + entries)]
+
+
+def _wkt(crs: pyproj.CRS) -> str:
+    """The system as WKT 1, which LAS prescribes, or as WKT 2 if WKT 1 cannot describe it."""
+    import pyproj
+
+    try:
+        return crs.to_wkt("WKT1_GDAL")
+    except pyproj.exceptions.CRSError:
+        return crs.to_wkt()
+
+
+def states_system(records: Iterable[Vlr]) -> bool:
+    """Whether a file has any record of a system, understood or not."""
+    return any(r.user_id in USERS and r.record_id in (WKT_RECORD, KEYS_RECORD) for r in records)
 
 
 def _of_wkt(data: bytes, problems: list[str]) -> CrsRecord:

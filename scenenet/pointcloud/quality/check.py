@@ -18,7 +18,6 @@ from scenenet.core.settings import Settings
 from scenenet.pointcloud.class_schemes import ClassScheme, class_scheme
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.file_kinds import kind_of
-from scenenet.pointcloud.las.crs import Unit
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
 from scenenet.pointcloud.quality.cell_counts import CellCounts, DuplicateCount
@@ -32,10 +31,11 @@ from scenenet.pointcloud.quality.report import (
 from scenenet.pointcloud.quality.screening import Finding, Screening, of_samples
 from scenenet.pointcloud.reading import SurveyInfo, iter_chunks, survey_info
 from scenenet.pointcloud.ts40k import sample_files
-from scenenet.pointcloud.units import look_like_degrees
+from scenenet.pointcloud.units import look_like_degrees, unit_name
 
 if TYPE_CHECKING:
     import laspy
+    import pyproj
 
 METRES_IN_A_DEGREE = 111_320.0
 
@@ -105,7 +105,10 @@ class Tally:
 
 
 def check_survey(
-    path: str | Path, codes: str | None = None, settings: CheckSettings | None = None
+    path: str | Path,
+    codes: str | None = None,
+    settings: CheckSettings | None = None,
+    crs: pyproj.CRS | None = None,
 ) -> SurveyReport:
     """Read a survey once and report its content and defects.
 
@@ -114,27 +117,28 @@ def check_survey(
             checked as one survey.
         codes: class scheme; None if unknown, in which case classes have no names.
         settings: limits of the check.
+        crs: the system of the survey if a file states none; None if it is not known.
 
     Returns:
         the report; defects that do not prevent reading are among its warnings.
 
     Raises:
-        InputError: the survey cannot be read.
+        InputError: the survey cannot be read, or states another system than ``crs``.
     """
     settings = settings or CheckSettings()
     path = Path(path)
     scheme = None if codes is None else class_scheme(codes)
     if path.is_dir():
-        checked = [_check(sample, scheme, settings) for sample in sample_files(path)]
+        checked = [_check(sample, scheme, settings, crs) for sample in sample_files(path)]
         return _together(path, checked, scheme)
-    return _check(path, scheme, settings)[0]
+    return _check(path, scheme, settings, crs)[0]
 
 
 def _check(
-    path: Path, scheme: ClassScheme | None, settings: CheckSettings
+    path: Path, scheme: ClassScheme | None, settings: CheckSettings, crs: pyproj.CRS | None
 ) -> tuple[SurveyReport, list[Finding]]:
     """The report on one file, and those of its warnings that a folder reports together."""
-    info = survey_info(path)
+    info = survey_info(path, crs)
     header = read_header(path) if kind_of(path) == "las" else None
     degrees = _in_degrees(info)
     planar = info.record.planar
@@ -241,8 +245,8 @@ def _report(
         density_per_m2=None if not area else n_points / area,
         crs=None if info.crs is None else info.crs.name,
         epsg=None if info.crs is None else info.crs.to_epsg(),
-        unit="degree" if degrees else _unit_name(info.record.planar),
-        vertical_unit=_unit_name(info.record.vertical),
+        unit="degree" if degrees else info.record.planar and unit_name(info.record.planar),
+        vertical_unit=info.record.vertical and unit_name(info.record.vertical),
         codes=None if scheme is None else scheme.name,
         extra_dimensions=info.extra_dimensions,
         duplicated_points=tally.duplicates.estimate(n_points),
@@ -319,11 +323,3 @@ def _outermost(of: Callable[..., float], corners: Sequence[Corner | None]) -> Co
 def _finite(corner: np.ndarray) -> Corner | None:
     x, y, z = corner.tolist()
     return (x, y, z) if np.isfinite(corner).all() else None
-
-
-def _unit_name(unit: Unit | None) -> str | None:
-    if unit is None:
-        return None
-    known = (("metre", 1.0), ("foot", 0.3048), ("US survey foot", 1200 / 3937))
-    same = (name for name, metres in known if abs(unit.metres - metres) < 1e-9)
-    return next(same, unit.name)

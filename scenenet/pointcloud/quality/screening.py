@@ -31,6 +31,8 @@ MIN_POINTS = 100
 CONVERTED = "it is converted, and the results are in the units of the survey"
 NO_SYSTEM = "the file names no coordinate system; its coordinates are taken to be in metres"
 
+GIVEN_SYSTEM = "its coordinate system is taken to be {}, as named by --crs"
+
 
 class Finding(NamedTuple):
     """Something that looks wrong.
@@ -108,6 +110,8 @@ class Screening:
         found = [Finding(text, text) for text in self.info.warnings]
         if not self.n_points:
             return [*found, Finding("empty", "the survey has no points")]
+        if self.info.record.given and self.info.crs is not None:
+            found.append(Finding("given system", GIVEN_SYSTEM.format(self.info.crs.name)))
         if reason := self.not_metres:
             place = f"{reason.place}: " if reason.place else ""
             return [*found, Finding("unit", f"{place}{reason.problem}. {reason.remedy}")]

@@ -1,0 +1,123 @@
+"""Surveys in feet, and ``--crs`` for files that state no system."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import laspy
+import pyogrio
+import pyproj
+import pytest
+
+from scenenet.pointcloud import PointCloud, read, write_las
+
+FOOT = 0.3048
+UTM, FEET = "EPSG:32629", "EPSG:2992"
+
+
+@pytest.fixture
+def in_feet(pole_survey) -> Path:
+    """The survey of a pole, in feet, without a system."""
+    cloud, path = read(pole_survey), pole_survey.with_name("feet.laz")
+    write_las(path, PointCloud(cloud.xyz / FOOT, cloud.classification), scale=1e-4)
+    return path
+
+
+def tower(folder: Path, name: str) -> dict[str, str]:
+    with (folder / f"{name}.towers.csv").open(newline="") as stream:
+        [row] = csv.DictReader(stream)
+    return row
+
+
+def predict(call, *arguments: object):
+    return call("predict", *arguments, "--min-conductor", 0)
+
+
+def test_the_given_system_is_that_of_every_result(call, pole_survey, pole_model, tmp_path):
+    out = tmp_path / "out"
+    done = predict(call, pole_survey, "--model", pole_model, "--out", out, "--crs", UTM)
+    assert done.code == 0, done.err
+    assert "WGS 84 / UTM zone 29N, as named by --crs" in done.err
+    assert "names no coordinate system" not in done.err
+    assert json.loads((out / "field.summary.json").read_text())["crs"] == UTM
+    assert pyproj.CRS(pyogrio.read_info(out / "field.gpkg", layer="towers")["crs"]) == UTM
+    geojson = json.loads((out / "field.towers.geojson").read_text())
+    row = tower(out, "field")
+    degrees = pyproj.Transformer.from_crs(UTM, 4326, always_xy=True)
+    [feature] = geojson["features"]
+    assert feature["geometry"]["coordinates"][:2] == pytest.approx(
+        degrees.transform(float(row["x"]), float(row["y"]))
+    )
+    assert "coordinates" not in geojson
+    assert laspy.read(out / "field.laz").header.parse_crs() == pyproj.CRS(UTM)
+    assert laspy.read(pole_survey).header.parse_crs() is None
+
+
+def test_the_given_system_says_that_a_survey_is_in_feet(
+    call, pole_survey, in_feet, pole_model, tmp_path
+):
+    out = tmp_path / "out"
+    assert predict(call, pole_survey, "--model", pole_model, "--out", out).code == 0
+    done = predict(call, in_feet, "--model", pole_model, "--out", out, "--crs", FEET)
+    assert done.code == 0, done.err
+    metres, feet = tower(out, "field"), tower(out, "feet")
+    for name in ("x", "y", "height", "base"):
+        assert float(feet[name]) * FOOT == pytest.approx(float(metres[name]), abs=0.1), name
+    assert feet["id"] == metres["id"]
+    assert json.loads((out / "feet.summary.json").read_text())["units"] == ["foot"] * 3
+
+
+def test_an_explanation_is_in_the_units_of_the_survey(
+    call, pole_survey, in_feet, pole_model, tmp_path
+):
+    page = tmp_path / "why.html"
+    explain = ("--model", pole_model, "--min-conductor", 0, "--json", "--overwrite")
+    [metres] = json.loads(call("explain", pole_survey, "--out", page, *explain).out)
+    assert "height [m]" in page.read_text()
+    done = call("explain", in_feet, "--out", page, "--crs", FEET, *explain)
+    assert done.code == 0, done.err
+    [feet] = json.loads(done.out)
+    assert (feet["unit"], feet["vertical_unit"], metres["unit"]) == ("foot", "foot", "metre")
+    for name in ("x", "y", "height"):
+        assert feet[name] * FOOT == pytest.approx(metres[name], abs=0.1), name
+    assert len(feet["doubts"]) == len(metres["doubts"])
+    text = page.read_text()
+    assert all(label in text for label in ("x [ft]", "height [ft]", "Its axes are in m."))
+    # The picture has the points within a tower's height in metres, not in feet.
+    assert "14 m high" in text
+
+
+def test_a_contradiction_stops_only_its_file(call, pole_survey, pole_model, tmp_path):
+    tiles = tmp_path / "tiles"
+    tiles.mkdir()
+    cloud = read(pole_survey)
+    for name, crs in (("a", None), ("b", pyproj.CRS(32630)), ("c", pyproj.CRS(32629))):
+        write_las(tiles / f"{name}.laz", PointCloud(cloud.xyz, cloud.classification, crs=crs))
+    out = tmp_path / "out"
+    done = predict(call, tiles, "--model", pole_model, "--out", out, "--crs", UTM)
+    assert done.code == 1
+    assert "b.laz: the file states WGS 84 / UTM zone 30N, and --crs names" in done.err
+    with (out / "tiles" / "status.csv").open(newline="") as stream:
+        status = {row["file"]: row["status"] for row in csv.DictReader(stream)}
+    assert status == {"a.laz": "predicted", "b.laz": "failed", "c.laz": "predicted"}
+    checked = call("check", tiles / "*.laz", "--crs", UTM, "--json")
+    assert checked.code == 1
+    assert [report["epsg"] for report in json.loads(checked.out)] == [32629, 32629]
+
+
+@pytest.mark.parametrize("text", ["EPSG:99999", "no system", "EPSG:5703", "", "field.laz"])
+@pytest.mark.parametrize("command", ["predict", "check", "explain"])
+def test_what_is_no_system_is_a_wrong_usage(call, pole_survey, pole_model, tmp_path, command, text):
+    out = ("--out", tmp_path / "out.html", "--model", pole_model) if command != "check" else ()
+    text = str(pole_survey) if text == "field.laz" else text
+    done = call(command, pole_survey, "--crs", text, *out)
+    assert done.code == 2
+    assert "is no coordinate system with x and y" in " ".join(done.err.replace("│", " ").split())
+
+
+def test_a_system_may_be_a_file_with_its_wkt(call, pole_survey, tmp_path):
+    (tmp_path / "line.prj").write_text(pyproj.CRS(UTM).to_wkt("WKT1_ESRI"))
+    done = call("check", pole_survey, "--crs", tmp_path / "line.prj", "--json")
+    assert (done.code, json.loads(done.out)[0]["epsg"]) == (0, 32629)

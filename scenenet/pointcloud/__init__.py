@@ -8,6 +8,7 @@
 - ``las``: LAS, LAZ and COPC files.
 - ``ts40k``: samples of the TS40K dataset.
 - ``append_dimensions``: a copy of a survey with further dimensions.
+- ``copc``: LAZ files as COPC, with PDAL.
 - ``quality``: the content of a survey and its defects (``scenenet check``).
 """
 

@@ -17,6 +17,7 @@ from scenenet.core.provenance import fingerprint
 from scenenet.core.scratch import temporary_directory
 from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud import add_dimensions
+from scenenet.pointcloud.copc import SUFFIX, write_copc
 from scenenet.prediction.file_status import SurveyFile, write_status
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
@@ -46,6 +47,7 @@ class PredictionFiles:
         geopackage, geojson, table: the tower list (``scenenet.prediction.tower_lists``).
         summary: ``PredictionSummary`` (JSON).
         status: a row per file of the survey (CSV); None for a survey that is one file.
+        copc: whether each file of the points is also written as COPC (``copc_of``).
     """
 
     points: Mapping[Path, Path]
@@ -54,9 +56,10 @@ class PredictionFiles:
     table: Path
     summary: Path
     status: Path | None = None
+    copc: bool = False
 
     @classmethod
-    def of(cls, survey: SurveyFiles | Path, folder: Path) -> PredictionFiles:
+    def of(cls, survey: SurveyFiles | Path, folder: Path, *, copc: bool = False) -> PredictionFiles:
         """The files that the command line writes for a survey. The points of one with several files
         are in a folder with its name, with its status."""
         if not isinstance(survey, SurveyFiles):
@@ -74,6 +77,7 @@ class PredictionFiles:
             table=folder / f"{survey.name}.towers.csv",
             summary=folder / f"{survey.name}.summary.json",
             status=place / "status.csv" if survey.tiled else None,
+            copc=copc,
         )
 
     @property
@@ -84,7 +88,12 @@ class PredictionFiles:
 
     def outputs(self) -> list[Output]:
         lists = [Output(path, self.is_own) for path in (*self.lists, self.summary)]
-        return [Output(path, self.is_own, file) for file, path in self.points.items()] + lists
+        points = [Output(path, self.is_own, file) for file, path in self.points.items()]
+        if self.copc:
+            points += [
+                Output(copc_of(path), self.is_own, file) for file, path in self.points.items()
+            ]
+        return points + lists
 
     def is_own(self, path: Path) -> bool:
         """Whether ``path`` is as an earlier prediction wrote it; its summary is the record, and
@@ -114,18 +123,24 @@ class PredictionFiles:
         return written
 
 
-def require_space(surveys: Sequence[Mapping[Path, int]], out: Path) -> None:
+def copc_of(points: Path) -> Path:
+    """The COPC file of a file of points."""
+    return points.with_suffix(SUFFIX)
+
+
+def require_space(surveys: Sequence[Mapping[Path, int]], out: Path, *, copc: bool = False) -> None:
     """Check that the disks have room for all results, and for the temporary files of one survey.
 
     Args:
         surveys: for each survey, its files with the number of points of each.
         out: folder of the results.
+        copc: whether the points are written as COPC too.
 
     Raises:
         OutputError: a disk has too little space.
     """
     sizes = [(path.stat().st_size, points) for files in surveys for path, points in files.items()]
-    results = sum(size + RESULT_BYTES * points for size, points in sizes)
+    results = sum(size + RESULT_BYTES * points for size, points in sizes) * (2 if copc else 1)
     scratch = SCRATCH_BYTES * max((sum(files.values()) for files in surveys), default=0)
     check_space({out: results, temporary_directory(): scratch})
 
@@ -164,6 +179,10 @@ def predict_to_files(
             partial = stack.enter_context(atomic(target))
             read = (write_points(prediction, path, partial),)
             written[files.key(target)] = fingerprint(partial)
+            if files.copc:
+                copc = stack.enter_context(atomic(copc_of(target)))
+                write_copc(partial, copc)
+                written[files.key(copc_of(target))] = fingerprint(copc)
         lists = [stack.enter_context(atomic(path)) for path in files.lists]
         record = stack.enter_context(atomic(files.summary))
         prediction = replace(prediction, files=read)
@@ -190,6 +209,10 @@ def _write_tiles(
                     file = write_points(prediction, file.path, partial)
                     written[files.key(target)] = fingerprint(partial)
                 write_json(files.unfinished, written)
+                if files.copc:
+                    write_copc(target, copc_of(target))
+                    written[files.key(copc_of(target))] = fingerprint(copc_of(target))
+                    write_json(files.unfinished, written)
             except OutputError:
                 raise
             except InputError as error:

@@ -11,6 +11,11 @@ import tempfile
 import laspy
 import pytest
 
+from scenenet.core.errors import OutputError
+from scenenet.core.outputs import check_outputs
+from scenenet.pointcloud import survey_info
+from scenenet.prediction.writers import PredictionFiles
+
 
 def test_another_survey_of_the_same_name_is_not_replaced(call, pole_survey, pole_model):
     folder = pole_survey.parent
@@ -174,3 +179,33 @@ def test_a_file_that_cannot_grow_ends_with_a_message_and_no_result(
     assert not re.search(r"/\.field\.", done.err)
     assert "Traceback" not in done.err
     assert not [path for path in out.rglob("*") if path.is_file()]
+
+
+def test_copc_without_pdal_is_refused_before_the_work(
+    call, pole_survey, pole_model, tmp_path, monkeypatch
+):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    out = tmp_path / "out"
+    done = call("predict", pole_survey, "--model", pole_model, "--out", out, "--copc")
+    assert done.code == 1
+    assert done.err.startswith("error: --copc needs the program pdal, which is not on PATH")
+    assert not out.exists()
+
+
+def test_copc_is_written_beside_the_points(call, pole_survey, pole_model, tmp_path):
+    if shutil.which("pdal") is None:
+        pytest.skip("no pdal here: install PDAL to test the conversion itself")
+    out = tmp_path / "out"
+    for _ in range(2):  # the second run replaces the results of the first
+        done = call("predict", pole_survey, "--model", pole_model, "--out", out, "--copc")
+        assert done.code == 0, done.err
+    assert survey_info(out / "field.copc.laz").n_points == survey_info(out / "field.laz").n_points
+
+
+def test_a_copc_file_of_another_origin_is_not_replaced(pole_survey, tmp_path):
+    files = PredictionFiles.of(pole_survey, tmp_path / "out", copc=True)
+    [copc] = [o.path for o in files.outputs() if o.path.name == "field.copc.laz"]
+    copc.parent.mkdir()
+    copc.write_bytes(b"mine")
+    with pytest.raises(OutputError, match=r"field\.copc\.laz: this file exists"):
+        check_outputs(files.outputs(), [pole_survey])

@@ -53,6 +53,12 @@ def command(
             "every code]",
         ),
     ] = None,
+    copc: Annotated[
+        bool,
+        typer.Option(
+            "--copc", help="Write the points as COPC too (NAME.copc.laz). Needs the program pdal."
+        ),
+    ] = False,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
@@ -71,8 +77,9 @@ def command(
     NAME.gpkg: the towers, the coverage and the file as layers, in the CRS of the survey, with
     styles for QGIS.
 
-    NAME.towers.csv, NAME.towers.geojson: the towers, with position, height, base elevation (m) and
-    probability. GeoJSON is in longitude and latitude where the CRS is known.
+    NAME.towers.csv, NAME.towers.geojson: the towers, with position, height, base elevation and
+    probability, in the units of the survey. GeoJSON is in longitude and latitude where the CRS is
+    known.
 
     NAME.summary.json: counts, settings and time.
 
@@ -82,6 +89,7 @@ def command(
     """
     from scenenet.core.errors import InputError
     from scenenet.core.outputs import check_outputs
+    from scenenet.pointcloud.copc import require_pdal
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles, look_at
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
@@ -90,9 +98,11 @@ def command(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
     )
     system = coordinate_system(crs)
+    if copc:
+        require_pdal()
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
-    files = {given: PredictionFiles.of(survey, out) for given, survey in named.items()}
+    files = {given: PredictionFiles.of(survey, out, copc=copc) for given, survey in named.items()}
     outputs = [output for each in files.values() for output in each.outputs()]
     inputs = [path for survey in named.values() for path in (survey.given, *survey.files)]
     check_outputs(outputs, [*inputs, model], overwrite=overwrite)
@@ -102,7 +112,7 @@ def command(
 
         read_model(model)[1].threshold()
     points = [{path: i.n_points for path, i in headers.items()} for headers in seen.values()]
-    require_space(points, out)
+    require_space(points, out, copc=copc)
     detection = detection_settings(min_conductor)
     summaries = []
     for given in seen:

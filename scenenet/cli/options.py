@@ -128,20 +128,17 @@ def coordinate_system(text: str | None) -> pyproj.CRS | None:
     """
     if text is None:
         return None
-    import pyproj
+    from scenenet.pointcloud.las.crs import named_system
 
     try:
         file = Path(text)
-        crs = pyproj.CRS(file.read_text(encoding="utf-8") if file.is_file() else text)
-    except (pyproj.exceptions.CRSError, OSError, ValueError):
-        crs = None
-    if crs is None or len(crs.axis_info) < 2:
+        return named_system(file.read_text(encoding="utf-8") if file.is_file() else text)
+    except (OSError, ValueError):  # of the file, and InputError
         raise typer.BadParameter(
             f"{text!r} is no coordinate system with x and y, such as EPSG:32629, and no file with "
             "its WKT",
             param_hint="--crs",
-        )
-    return crs
+        ) from None
 
 
 def detection_settings(min_conductor: float | None) -> DetectionSettings:

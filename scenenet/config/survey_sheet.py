@@ -53,9 +53,15 @@ class SurveyRow(Settings):
     )
     codes: Codes = Field(description="class scheme of the labels")
     role: Role = Field(description="train: part of the dataset; new: only classified")
+    crs: str = Field(
+        "",
+        description="coordinate system of a new survey whose file states none, such as "
+        "EPSG:32629; the column may be missing",
+    )
 
 
 COLUMNS = tuple(SurveyRow.model_fields)
+NEEDED = tuple(name for name, field in SurveyRow.model_fields.items() if field.is_required())
 
 
 @dataclass(frozen=True)
@@ -69,6 +75,7 @@ class Survey:
         role: train or new.
         origin: ``file`` for a recorded survey, ``synthetic`` for one that the workflow makes,
             ``ts40k`` for a folder of samples.
+        crs: the coordinate system if the file states none, as text; None if it is not known.
     """
 
     name: str
@@ -76,6 +83,7 @@ class Survey:
     codes: Codes
     role: Role
     origin: Origin = "file"
+    crs: str | None = None
 
 
 def read_surveys(
@@ -169,12 +177,13 @@ def _check_header(header: list[str], file: str) -> None:
             place="line 1",
         )
     unknown = [name for name in header if name not in COLUMNS]
-    missing = [name for name in COLUMNS if name not in header]
+    missing = [name for name in NEEDED if name not in header]
     problems = [f"column {name!r} is missing" for name in missing]
+    others = [name for name in COLUMNS if name not in header]
     problems += [
         f"column {name!r} is not known"
         + "".join(
-            f", did you mean {near!r}?" for near in difflib.get_close_matches(name, missing, 1)
+            f", did you mean {near!r}?" for near in difflib.get_close_matches(name, others, 1)
         )
         for name in unknown
     ]
@@ -191,7 +200,7 @@ def _check_header(header: list[str], file: str) -> None:
 def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey | None, list[str]]:
     """The survey of a row, or None if a cell is missing or is no path, and the problems of the
     row."""
-    problems = [f"{name} is empty" for name in COLUMNS if not row.get(name)]
+    problems = [f"{name} is empty" for name in NEEDED if not row.get(name)]
     if problems:
         return None, problems
     name, codes, role = row["survey"], row["codes"], row["role"]
@@ -208,6 +217,7 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
         problems.append(f"survey {name!r} {REPEATS}")
     problems += _unknown("codes", codes, tuple(SCHEMES))
     problems += _unknown("role", role, get_args(Role))
+    problems += _system_problems(row.get("crs", ""), role)
     if fault:
         return None, problems
     path = str(Path(path).expanduser())
@@ -219,7 +229,22 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
     problems += [] if synthetic else _path_problems(path, row["path"], role, root, config)
     origin: Origin = "synthetic" if synthetic else "file"
     # An unknown code or role is among the problems, and then the survey is not used.
-    return Survey(name, path, cast(Codes, codes), cast(Role, role), origin), problems
+    crs = row.get("crs") or None
+    return Survey(name, path, cast(Codes, codes), cast(Role, role), origin, crs), problems
+
+
+def _system_problems(text: str, role: str) -> list[str]:
+    if not text:
+        return []
+    if role == "train":
+        return ["crs is only for new surveys; surveys to train on are used as their files state"]
+    from scenenet.pointcloud.las.crs import named_system
+
+    try:
+        named_system(text)
+    except InputError as error:
+        return [f"crs {error}"]
+    return []
 
 
 def _unknown(column: str, value: str, known: tuple[str, ...]) -> list[str]:

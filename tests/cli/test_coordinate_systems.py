@@ -39,8 +39,8 @@ def test_the_given_system_is_that_of_every_result(call, pole_survey, pole_model,
     out = tmp_path / "out"
     done = predict(call, pole_survey, "--model", pole_model, "--out", out, "--crs", UTM)
     assert done.code == 0, done.err
-    assert "WGS 84 / UTM zone 29N, as named by --crs" in done.err
-    assert "names no coordinate system" not in done.err
+    assert "taken to be in WGS 84 / UTM zone 29N, as given" in done.err
+    assert "taken to be in metres" not in done.err
     assert json.loads((out / "field.summary.json").read_text())["crs"] == UTM
     assert pyproj.CRS(pyogrio.read_info(out / "field.gpkg", layer="towers")["crs"]) == UTM
     geojson = json.loads((out / "field.towers.geojson").read_text())
@@ -98,7 +98,7 @@ def test_a_contradiction_stops_only_its_file(call, pole_survey, pole_model, tmp_
     out = tmp_path / "out"
     done = predict(call, tiles, "--model", pole_model, "--out", out, "--crs", UTM)
     assert done.code == 1
-    assert "b.laz: the file states WGS 84 / UTM zone 30N, and --crs names" in done.err
+    assert "b.laz: the file states WGS 84 / UTM zone 30N, and the system given" in done.err
     with (out / "tiles" / "status.csv").open(newline="") as stream:
         status = {row["file"]: row["status"] for row in csv.DictReader(stream)}
     assert status == {"a.laz": "predicted", "b.laz": "failed", "c.laz": "predicted"}

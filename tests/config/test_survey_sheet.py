@@ -48,6 +48,25 @@ def test_a_row_is_a_survey(root):
     ]
 
 
+def test_the_system_of_a_new_survey_may_be_named(root):
+    header = f"{HEADER}\tcrs"
+    rows = [
+        "north\tdata/north.laz\tasprs\tnew\tEPSG:32629+5703",
+        "south\tdata/south.las\tasprs\tnew\t",
+        "samples\tts40k\tedp\ttrain",
+    ]
+    assert [survey.crs for survey in read(root, *rows, header=header)] == [
+        "EPSG:32629+5703", None, None,
+    ]  # fmt: skip
+    for system, role, expected in (
+        ("EPSG:99999", "new", "crs 'EPSG:99999' is no coordinate system with x and y"),
+        ("EPSG:5703", "new", "crs 'EPSG:5703' is no coordinate system with x and y"),
+        ("EPSG:32629", "train", "crs is only for new surveys"),
+    ):
+        row = f"north\tdata/north.laz\tedp\t{role}\t{system}"
+        assert f"line 2: {expected}" in complaint(root, row, header=header)
+
+
 def test_columns_may_come_in_any_order_among_comments_and_empty_lines(root):
     header = "# my surveys\nrole\tsurvey\tcodes\tpath"
     rows = ["", "# the first", "new\tnorth\tasprs\tdata/north.laz"]

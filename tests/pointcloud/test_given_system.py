@@ -49,8 +49,8 @@ def test_a_file_without_a_system_takes_the_given_one(make_las, given):
     assert survey_info(source).crs is None
     report = check_survey(source, crs=given)
     assert report.facts.crs == given.name
-    assert any(f"{given.name}, as named by --crs" in text for text in report.warnings)
-    assert not any("names no coordinate system" in text for text in report.warnings)
+    assert any(f"taken to be in {given.name}, as given" in text for text in report.warnings)
+    assert not any("taken to be in metres" in text for text in report.warnings)
 
 
 def write_with(source, crs):
@@ -74,8 +74,12 @@ def test_a_file_that_states_the_same_system_is_as_without_the_option(make_las, v
 @pytest.mark.parametrize(
     ("text", "given", "words"),
     [
-        (UTM.to_wkt(), pyproj.CRS(32630), "UTM zone 29N, and --crs names WGS 84 / UTM zone 30N"),
-        (FEET.to_wkt(), pyproj.CRS(2991), "--crs names"),
+        (
+            UTM.to_wkt(),
+            pyproj.CRS(32630),
+            "UTM zone 29N, and the system given for it is WGS 84 / UTM zone 30N",
+        ),
+        (FEET.to_wkt(), pyproj.CRS(2991), "given for it is"),
         (HEIGHTS_IN_FEET.to_wkt(), pyproj.CRS("EPSG:32629+5703"), "NAVD88 height (ftUS)"),
         ('PROJCS["?",UNIT["US survey foot",0.304800609601]', UTM, "the US survey foot as unit"),
     ],
@@ -86,8 +90,8 @@ def test_a_contradiction_is_an_error(make_las, text, given, words):
         survey_info(source, given)
     assert words in str(caught.value)
     assert str(source) in str(caught.value)
-    assert "Leave --crs out" in str(caught.value)
-    with pytest.raises(InputError, match="--crs names"):
+    assert "Give none for this file" in str(caught.value)
+    with pytest.raises(InputError, match="the system given for it"):
         check_survey(source, crs=given)
 
 

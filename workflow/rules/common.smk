@@ -86,6 +86,12 @@ def source(survey):
     return path if SURVEYS[survey].origin == "synthetic" else ancient(local(path))
 
 
+def given_system(survey):
+    """The coordinate system that the sheet names for a survey, for the parameters of its jobs."""
+    crs = SURVEYS[survey].crs
+    return {} if crs is None else {"crs": crs}
+
+
 @cache
 def source_print(survey):
     """What identifies a survey: its fingerprint, or the recipe of a synthetic one."""

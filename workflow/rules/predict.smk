@@ -42,6 +42,7 @@ rule predict:
             {name: value for name, value in SETTINGS["predict"].items() if name != "model"},
             detection=SETTINGS["detection"],
             input={"survey": source_print(w.survey)},
+            **given_system(w.survey),
         ),
     message:
         "Classifying {wildcards.survey}"

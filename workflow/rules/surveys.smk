@@ -54,6 +54,7 @@ rule check:
             SETTINGS["check"],
             codes=SURVEYS[w.survey].codes,
             input={"survey": source_print(w.survey)},
+            **given_system(w.survey),
         ),
     message:
         "Checking {wildcards.survey}"

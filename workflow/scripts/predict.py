@@ -7,15 +7,19 @@ import _job
 
 def predict(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
+    from scenenet.pointcloud.las.crs import named_system
     from scenenet.pointcloud.reading import survey_of_lengths
     from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.survey_files import SurveyFiles
     from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
     survey, output = Path(job.input.survey), job.output
-    require_space([{survey: survey_of_lengths(survey).n_points}], Path(output.points))
+    given = job.identity.get("crs")
+    crs = None if given is None else named_system(given)
+    require_space([{survey: survey_of_lengths(survey, crs).n_points}], Path(output.points))
     lists = (Path(output[name]) for name in ("geopackage", "geojson", "table", "summary"))
     predict_to_files(
-        survey,
+        SurveyFiles.of(survey, crs),
         job.input.model,
         PredictionFiles({survey: Path(output.points)}, *lists),
         PredictSettings(**job.settings),

@@ -93,6 +93,26 @@ def read_crs(records: Iterable[Vlr]) -> CrsRecord:
     return CrsRecord(None, tuple(dict.fromkeys(problems)), planar, vertical)
 
 
+def named_system(text: str) -> pyproj.CRS:
+    """The system that a user names, such as ``EPSG:32629``, ``EPSG:32629+5703`` or its WKT.
+
+    Raises:
+        InputError: there is no such system, or it has no x and y.
+    """
+    import pyproj
+
+    try:
+        crs = pyproj.CRS(text)
+    except pyproj.exceptions.CRSError:
+        crs = None
+    if crs is None or len(crs.axis_info) < 2:
+        raise InputError(
+            f"{text!r} is no coordinate system with x and y",
+            remedy="Name one such as EPSG:32629, or EPSG:32629+5703 with heights",
+        )
+    return crs
+
+
 def with_system(record: CrsRecord, given: pyproj.CRS) -> CrsRecord:
     """A record, completed by the system that the user names where the file states none.
 
@@ -142,9 +162,10 @@ def same_system(one: pyproj.CRS | None, other: pyproj.CRS | None) -> bool:
 
 def _contradicts(given: pyproj.CRS, stated: str) -> InputError:
     return InputError(
-        f"the file states {stated}, and --crs names {given.name}; what a file states is never "
-        "overridden",
-        remedy="Leave --crs out for this file, or correct its record first",
+        f"the file states {stated}, and the system given for it is {given.name}; what a file "
+        "states is never overridden",
+        remedy="Give none for this file (--crs, or column crs of the survey sheet), or correct its "
+        "record first",
     )
 
 

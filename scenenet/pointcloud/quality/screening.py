@@ -31,7 +31,7 @@ MIN_POINTS = 100
 CONVERTED = "it is converted, and the results are in the units of the survey"
 NO_SYSTEM = "the file names no coordinate system; its coordinates are taken to be in metres"
 
-GIVEN_SYSTEM = "its coordinate system is taken to be {}, as named by --crs"
+GIVEN_SYSTEM = "the file names no coordinate system; it is taken to be in {}, as given"
 
 
 class Finding(NamedTuple):

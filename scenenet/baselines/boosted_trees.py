@@ -134,7 +134,7 @@ def fit(
         InputError: the crops have no tower voxel, or no other one.
     """
     features = [voxel_features(sample) for sample in training]
-    return _fit(features, [sample.tower for sample in training], settings, seed, provenance)
+    return fit_features(features, [sample.tower for sample in training], settings, seed, provenance)
 
 
 def threshold_curve(model: BoostedTrees, samples: Sequence[VoxelSample]) -> ThresholdCurve:
@@ -145,9 +145,9 @@ def threshold_curve(model: BoostedTrees, samples: Sequence[VoxelSample]) -> Thre
     return total
 
 
-def tune(model: BoostedTrees, validation: Sequence[VoxelSample]) -> BoostedTrees:
-    """The model with the tau of the highest F0.5 on ``validation``."""
-    return replace(model, tau=threshold_curve(model, validation).best()[0])
+def tune(model: BoostedTrees, curve: ThresholdCurve) -> BoostedTrees:
+    """The model with the tau of the highest F0.5 of ``curve``."""
+    return replace(model, tau=curve.best()[0])
 
 
 def fit_and_tune(
@@ -177,19 +177,27 @@ def fit_and_tune(
     curve = ThresholdCurve.empty()
     for out, sample in enumerate(training):
         others = [i for i in range(len(training)) if i != out]
-        model = _fit([features[i] for i in others], [towers[i] for i in others], settings, seed)
+        model = fit_features(
+            [features[i] for i in others], [towers[i] for i in others], settings, seed
+        )
         curve += ThresholdCurve.of(*sample.spread(model.of_features(features[out])))
-    model = _fit(features, towers, settings, seed, provenance)
-    return replace(model, tau=curve.best()[0]), curve
+    model = fit_features(features, towers, settings, seed, provenance)
+    return tune(model, curve), curve
 
 
-def _fit(
+def fit_features(
     features: Sequence[np.ndarray],
     towers: Sequence[np.ndarray],
     settings: BoostedTreesSettings,
     seed: int,
     provenance: dict[str, Any] | None = None,
 ) -> BoostedTrees:
+    """``fit`` on crops whose features are known.
+
+    Args:
+        features: (M, F) of each crop, from ``voxel_features``.
+        towers: (M,) bool of each crop, its occupied tower voxels.
+    """
     tower = np.concatenate([*towers, np.empty(0, bool)])
     n_tower = int(tower.sum())
     if n_tower == 0 or n_tower == len(tower):

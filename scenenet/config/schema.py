@@ -132,6 +132,9 @@ class Config(Settings):
     only_studies: tuple[str, ...] | None = Field(
         None, description="names of the studies to run; null for all of them"
     )
+    study_job: int = Field(
+        60, ge=1, description="trainings of a study that one job runs, or one seed of all variants"
+    )
     studies: tuple[StudySettings, ...] = Field(
         (),
         description="series of short trainings that differ in one setting; see config/studies.yaml",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -143,7 +143,7 @@ def train_boosted_trees(
     if validation:
         grown = boosted_trees.fit(training, settings, seed)
         curve = boosted_trees.threshold_curve(grown, validation)
-        model = replace(grown, tau=curve.best()[0])
+        model = boosted_trees.tune(grown, curve)
     else:
         model, curve = boosted_trees.fit_and_tune(training, settings, seed)
     seconds = time.perf_counter() - begin

@@ -32,7 +32,7 @@ SCORED = {
 """Jobs after the training of two models of each kind."""
 
 TRAINED = {"train_scenenet": 2, "train_cnn": 2, **SCORED}
-STUDIED = {"study": 2, "study_figure": 2, "track_studies": 1}
+STUDIED = {"study": 2, "join_study": 2, "study_figure": 2, "track_studies": 1}
 """There are two studies, of one model."""
 
 
@@ -187,7 +187,7 @@ def test_another_study_runs_itself_and_what_shows_it(project):
     study = {"name": "seeds", "title": "t", "place": "5.3", "asks": "?", "seeds": [0, 1]}
     studies = [*project.configured("studies"), {**study, "variants": [{"name": "as it is"}]}]
     project.configure({"studies": studies})
-    own = {"study": 1, "study_figure": 1, "track_studies": 1}
+    own = {"study": 1, "join_study": 1, "study_figure": 1, "track_studies": 1}
     shown = {"tables": 1, "report": 1, "mlflow_store": 1, "track": 1, "register": 1}
     assert project.planned() == {**SETTINGS, **own, **shown, "track_experiment": 2}
 

@@ -193,12 +193,20 @@ COMPONENTS = {
     BOOSTED_TREES: None,
 }
 
+# Job of a study -> the study and the seeds of the job.
+STUDY_JOBS = {
+    f"{study.name}/{name}": (study.name, list(seeds))
+    for study in settings.studies
+    for name, seeds in study.jobs(settings.study_job).items()
+}
+
 # Wildcard -> its values. A rule that is for some of them only says so in its own constraints.
 VALUES = {
     "survey": [*TRAIN, *NEW],
     "model": [model.name for model in settings.models],
     "seed": list(settings.seeds),
     "study": [study.name for study in settings.studies],
+    "study_job": [*STUDY_JOBS],
     "experiment": EXPERIMENTS,
     "contender": [*CROSS_VALIDATED] if "cross_validation" in EXPERIMENTS else [],
     "component": [*COMPONENTS] if "components" in EXPERIMENTS else [],
@@ -219,6 +227,7 @@ wildcard_constraints:
     survey=any_of(VALUES["survey"]),
     model=any_of(VALUES["model"]),
     study=any_of(VALUES["study"]),
+    study_job=any_of(VALUES["study_job"]),
     experiment=any_of(VALUES["experiment"]),
     contender=any_of(VALUES["contender"]),
     component=any_of(VALUES["component"]),

@@ -1,10 +1,48 @@
-"""Studies: many small trainings in one job each (thesis 5.2.7, 5.3)."""
+"""Studies: many small trainings, divided into jobs by their seeds (thesis 5.2.7, 5.3)."""
+
+
+def of_study(study, output):
+    """The files of an output of the jobs of a study."""
+    jobs = [job for job, (name, _) in STUDY_JOBS.items() if name == study]
+    return every("study", output, study_job=jobs)
 
 
 rule study:
     input:
         stores=every("crops", "store"),
         manifests=every("crops", "manifest"),
+    output:
+        runs=f"{R}/study/{{study_job}}/runs.csv",
+        times=f"{R}/study/{{study_job}}/times.csv",
+        provenance=f"{R}/study/{{study_job}}/provenance.json",
+    log:
+        f"{R}/logs/study/{{study_job}}.log",
+    benchmark:
+        f"{R}/benchmarks/study/{{study_job}}.tsv"
+    conda:
+        "../envs/scenenet.yaml"
+    threads: 1
+    resources:
+        mem_mb=3000,
+        runtime=600,
+    params:
+        job=lambda w: job(
+            "study",
+            study_settings(STUDY_JOBS[w.study_job][0]) | {"seeds": STUDY_JOBS[w.study_job][1]},
+            model=model_settings(settings.study_named(STUDY_JOBS[w.study_job][0]).model),
+            voxels=SETTINGS["voxels"],
+            split=SETTINGS["split"],
+        ),
+    message:
+        "Running trainings of the study {wildcards.study_job}"
+    script:
+        "../scripts/study.py"
+
+
+rule join_study:
+    input:
+        runs=lambda w: of_study(w.study, "runs"),
+        times=lambda w: of_study(w.study, "times"),
     output:
         runs=in_report(
             f"{R}/study/{{study}}/runs.csv",
@@ -16,24 +54,18 @@ rule study:
         times=f"{R}/study/{{study}}/times.csv",
         provenance=f"{R}/study/{{study}}/provenance.json",
     log:
-        f"{R}/logs/study/{{study}}.log",
+        f"{R}/logs/join_study/{{study}}.log",
     benchmark:
-        f"{R}/benchmarks/study/{{study}}.tsv"
+        f"{R}/benchmarks/join_study/{{study}}.tsv"
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
-        mem_mb=3000,
-        runtime=600,
+        mem_mb=500,
+        runtime=5,
     params:
-        job=lambda w: job(
-            "study",
-            study_settings(w.study),
-            model=model_settings(settings.study_named(w.study).model),
-            voxels=SETTINGS["voxels"],
-            split=SETTINGS["split"],
-        ),
+        job=job("join_runs", {}),
     message:
-        "Running the study {wildcards.study}"
+        "Joining the trainings of the study {wildcards.study}"
     script:
-        "../scripts/study.py"
+        "../scripts/join_runs.py"

@@ -15,7 +15,7 @@ rule tables:
         tunings=every("tune", "tuning"),
         models=every("tune", "model"),
         scores=every("evaluate", "scores"),
-        studies=[*every("study", "runs"), *every("study", "times")],
+        studies=[*every("join_study", "runs"), *every("join_study", "times")],
         experiments=[*every("join_runs", "runs"), *every("join_runs", "times")],
         boosted_trees=[*every("boosted_trees", "scores"), *every("boosted_trees", "times")],
         certificates=every("certificate", "certificate"),

@@ -82,9 +82,10 @@ rule track_studies:
     input:
         **pictures(f"study-{study}" for study in VALUES["study"]),
         store=f"{R}/mlflow/store.json",
-        runs=every("study", "runs"),
-        times=every("study", "times"),
-        records=every("study", "provenance"),
+        runs=every("join_study", "runs"),
+        times=every("join_study", "times"),
+        joined=every("join_study", "provenance"),
+        records=[of_study(study, "provenance")[0] for study in VALUES["study"]],
     output:
         runs=expand(f"{R}/mlflow/study-{{study}}.json", study=VALUES["study"]),
         provenance=f"{R}/mlflow/studies.provenance.json",

@@ -10,14 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-import torch
 
 from scenenet.core.errors import InputError
 from scenenet.core.progress import track
-from scenenet.dataset.batches import batch
-from scenenet.dataset.crops import read_crops
+from scenenet.dataset.crops import CropClouds
 from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings, voxelise
+from scenenet.evaluation.inference_time import CROPS, milliseconds
 from scenenet.experiments.run_tables import write_runs
 from scenenet.experiments.studies.settings import Plan, StudySettings
 from scenenet.metrics.score_columns import SCORES
@@ -26,7 +25,7 @@ from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.base import VoxelModel
 from scenenet.models.factory import new_model
 from scenenet.models.geneo_model import GeneoModel
-from scenenet.models.predictions import threshold_curve
+from scenenet.models.predictions import probabilities, threshold_curve
 from scenenet.models.settings import ModelSettings
 from scenenet.training.gradient import LostTraining
 from scenenet.training.train import fit
@@ -95,7 +94,8 @@ class _Crops:
 
     def __init__(self, manifests: Sequence[str | Path]) -> None:
         self._manifests = list(manifests)
-        self._grids: dict[VoxelSettings, dict[str, VoxelSample]] = {}
+        self._clouds = CropClouds(manifests)
+        self._samples: dict[tuple[VoxelSettings, str], VoxelSample] = {}
         self._parts: dict[SplitSettings, dict[str, list[str]]] = {}
 
     def parts(self, settings: SplitSettings) -> dict[str, list[str]]:
@@ -107,15 +107,14 @@ class _Crops:
         return self._parts[settings]
 
     def samples(self, grid: VoxelSettings, ids: Sequence[str]) -> list[VoxelSample]:
-        """The crops ``ids`` on ``grid``. They are voxelised from their points, once per grid and
-        one crop in memory at a time, because that is faster than reading voxels."""
-        if grid not in self._grids:
-            self._grids[grid] = {
-                crop.id: voxelise(cloud, grid.grid(cloud.xyz), crop.id)
-                for manifest in self._manifests
-                for crop, cloud in read_crops(manifest)
-            }
-        return [self._grids[grid][crop] for crop in ids]
+        """The crops ``ids`` on ``grid``, voxelised from their points when they are first needed."""
+        return [self._sample(grid, crop) for crop in ids]
+
+    def _sample(self, grid: VoxelSettings, crop: str) -> VoxelSample:
+        if (grid, crop) not in self._samples:
+            cloud = self._clouds[crop]
+            self._samples[grid, crop] = voxelise(cloud, grid.grid(cloud.xyz), crop)
+        return self._samples[grid, crop]
 
 
 def _trained(
@@ -177,11 +176,9 @@ def _scores(
     tau, chosen = threshold_curve(model, validation, measurement).best()
     curve: ThresholdCurve = threshold_curve(model, scored, measurement)
     counts = curve.at(tau)
-    begin = time.perf_counter()
-    with torch.no_grad():
-        for sample in scored:
-            model(batch([sample], measurement)[0])
-    inference = 1e3 * (time.perf_counter() - begin) / len(scored)
+    inference = milliseconds(
+        lambda sample: probabilities(model, sample, measurement), scored[:CROPS]
+    )
     return counts.scores() | {
         "alive": counts.tp > 0,
         "tau": tau,

@@ -69,6 +69,16 @@ class StudySettings(Settings):
         varied = (_named(dict(zip(self.vary, values, strict=True))) for values in combinations)
         return (*self.variants, *varied)
 
+    def jobs(self, trainings: int) -> dict[str, tuple[int, ...]]:
+        """The seeds of each job, by the name of the job, such as ``seeds-0-3``.
+
+        Args:
+            trainings: that a job runs about; a job has one seed or more, and all variants of each.
+        """
+        each = max(1, trainings // len(self.all_variants()))
+        groups = [self.seeds[first : first + each] for first in range(0, len(self.seeds), each)]
+        return {f"seeds-{'-'.join(map(str, dict.fromkeys((s[0], s[-1]))))}": s for s in groups}
+
     @property
     def is_grid(self) -> bool:
         """Whether the variants are exactly the combinations of two settings."""

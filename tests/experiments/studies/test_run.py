@@ -125,6 +125,13 @@ def test_another_architecture_or_protocol_is_a_change_as_any_other():
     assert (metres.kind, metres.protocol, metres.search.searches) == ("scenenet", "operational", 1)
 
 
+def test_jobs_divide_the_seeds_and_keep_the_variants_of_a_seed_together():
+    defined = study(seeds=range(5), variants=[{"name": name} for name in "abcd"])
+    assert defined.jobs(60) == {"seeds-0-4": (0, 1, 2, 3, 4)}
+    assert defined.jobs(9) == {"seeds-0-1": (0, 1), "seeds-2-3": (2, 3), "seeds-4": (4,)}
+    assert list(defined.jobs(1)) == [f"seeds-{seed}" for seed in range(5)]
+
+
 def test_a_study_without_variants_is_refused():
     with pytest.raises(ValueError, match="give variants, or vary, or both"):
         study()

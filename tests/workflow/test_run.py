@@ -20,7 +20,7 @@ STAGES = {
     *("synthesize", "check", "towers", "crops", "voxels", "split"),
     *("train", "tune", "champion", "evaluate", "predict"),
     *("certificate", "inference_time", "voxelisation_time"),
-    *("study", "join_study", "boosted_trees", "dataset_tables", "tables", "figures", "interactive_crop"),
+    *("study", "boosted_trees", "dataset_tables", "tables", "figures", "interactive_crop"),
     *("components", "label_noise", "join_runs"),
     *("track", "track_studies", "track_experiment", "register", "report"),
 }

@@ -1,12 +1,6 @@
 """Studies: many small trainings, divided into jobs by their seeds (thesis 5.2.7, 5.3)."""
 
 
-def of_study(study, output):
-    """The files of an output of the jobs of a study."""
-    jobs = [job for job, (name, _) in STUDY_JOBS.items() if name == study]
-    return every("study", output, study_job=jobs)
-
-
 rule study:
     input:
         stores=every("crops", "store"),

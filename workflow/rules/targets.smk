@@ -25,6 +25,12 @@ def every(stage, output, **values):
     return [file for name in names for file in _files(getattr(rules, name), output, values)]
 
 
+def of_study(study, output):
+    """The files of an output of the jobs of a study."""
+    jobs = [job for job, (name, _) in STUDY_JOBS.items() if name == study]
+    return every("study", output, study_job=jobs)
+
+
 def every_output():
     """Rule -> every file that it makes, for all rules so far. Synthetic surveys are no targets: what
     is made from them is complete without them, and to make one again would train everything again.

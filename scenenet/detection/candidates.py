@@ -81,7 +81,7 @@ def axes(
         if len(body) < settings.min_voxels or extent < settings.min_body:
             continue
         # The mean of neighbouring columns is often the same.
-        if all(np.hypot(*(axis - other)) > SAME_M for other in found):
+        if not found or (np.hypot(*(np.array(found) - axis).T) > SAME_M).all():
             found.append(axis)
             yield axis
 

@@ -23,10 +23,10 @@ coordinates; on a border, a millimetre would decide the id."""
 def tower_ids(places: np.ndarray) -> list[int]:
     """The id of each tower at ``places`` (n, 2), x and y in m; all differ, and none is 0.
 
-    The last five digits are y in steps of 10 m, without the thousands of km; the digits before them
-    are x in steps of 10 m, less 400 km as often as it goes. Of several towers with the same digits,
-    the one furthest to the south-west has them. Each of the others gets the next free number, so
-    only towers within a few cells of each other, or a whole period apart, have a say in an id.
+    The last five digits are y in steps of 10 m, modulo 1000 km. The digits before them are x in
+    steps of 10 m, modulo 400 km. If several towers have the same digits, the one furthest to the
+    south-west gets them, and each of the others gets the next free number. So an id depends only on
+    towers within a few cells, or a whole period away.
 
     Raises:
         ValueError: a coordinate is not finite.

@@ -236,9 +236,10 @@ def _voxelisation(crop: PointCloud, resolution: int) -> dict[str, Any]:
 
 
 def survey() -> dict[str, Any]:
-    """Prediction of a survey from file to file, compared with laspy reading and writing it."""
+    """Prediction of a survey from file to file by the model of the package, compared with laspy
+    reading and writing it."""
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.models.model_file import ModelCard, write_model
+    from scenenet.models.packaged import packaged_model
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.writers import PredictionFiles, predict_to_files
     from scenenet.synthetic import SyntheticSettings, make_survey
@@ -247,17 +248,11 @@ def survey() -> dict[str, Any]:
         folder = Path(scratch)
         source = folder / "line.laz"
         points = make_survey(SyntheticSettings(towers=30, seed=0), source)["points"]
-        model = SceneNet(generator=torch.Generator().manual_seed(0))
-        card = ModelCard(
-            name="bench", codes="edp", measurement="presence", fit="cube", resolution=64,
-            voxel_size=1.0, tau=0.9,
-        )  # fmt: skip
-        write_model(folder / "model.json", model, card)
         settings = PredictSettings()
 
         def ours() -> None:
             out = PredictionFiles.of(source, folder / "out")
-            predict_to_files(source, folder / "model.json", out, settings, DetectionSettings())
+            predict_to_files(source, packaged_model(), out, settings, DetectionSettings())
 
         def laspy_alone() -> None:
             peers.read_and_write(source, folder / "copy.laz", settings.chunk_points)

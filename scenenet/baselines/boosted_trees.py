@@ -197,6 +197,9 @@ def fit_features(
     Args:
         features: (M, F) of each crop, from ``voxel_features``.
         towers: (M,) bool of each crop, its occupied tower voxels.
+
+    Raises:
+        InputError: the crops have no tower voxel, or no other one.
     """
     tower = np.concatenate([*towers, np.empty(0, bool)])
     n_tower = int(tower.sum())

@@ -135,8 +135,8 @@ def coordinate_system(text: str | None) -> pyproj.CRS | None:
         return named_system(file.read_text(encoding="utf-8") if file.is_file() else text)
     except (OSError, ValueError):  # of the file, and InputError
         raise typer.BadParameter(
-            f"{text!r} is no coordinate system with x and y, such as EPSG:32629, and no file with "
-            "its WKT",
+            f"{text!r} is neither a coordinate system with x and y, such as EPSG:32629, nor a file "
+            "with its WKT",
             param_hint="--crs",
         ) from None
 

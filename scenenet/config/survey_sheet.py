@@ -237,7 +237,7 @@ def _system_problems(text: str, role: str) -> list[str]:
     if not text:
         return []
     if role == "train":
-        return ["crs is only for new surveys; surveys to train on are used as their files state"]
+        return ["crs is only for the role new; a training survey keeps the system of its file"]
     from scenenet.pointcloud.las.crs import named_system
 
     try:

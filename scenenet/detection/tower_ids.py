@@ -38,14 +38,14 @@ def tower_ids(places: np.ndarray) -> list[int]:
     # Poles of a portal often share x or y to the millimetre, and hardly ever the sum of both.
     order = np.lexsort((places[:, 0], places.sum(axis=1))).tolist()
     ids = [0] * len(wanted)
-    taken, late = {0}, []
+    taken, displaced = {0}, []
     for row in order:
         if wanted[row] in taken:
-            late.append(row)
+            displaced.append(row)
         else:
             taken.add(wanted[row])
             ids[row] = wanted[row]
-    for row in late:
+    for row in displaced:
         free = wanted[row]
         while free in taken:
             free = (free + 1) % (EAST * NORTH)

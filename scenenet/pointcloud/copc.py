@@ -1,4 +1,4 @@
-"""Convert a LAZ file to COPC with PDAL, which is no requirement of this package."""
+"""Convert a LAZ file to COPC with PDAL, which this package does not require."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def check_copc(source: Path, copc: Path) -> None:
     """Check from its header that a COPC file has the points and dimensions of its source.
 
     Raises:
-        InputError: it is no COPC, or lacks something.
+        InputError: it is not COPC, or lacks something.
     """
     before, after = survey_info(source), survey_info(copc)
     kept = {_as_pdal(name) for name in after.extra_dimensions}
@@ -85,7 +85,7 @@ def check_copc(source: Path, copc: Path) -> None:
         if not {_as_pdal(name), f"{_as_pdal(name)}0"} & kept  # PDAL numbers the parts of an array
     ]
     faults = [
-        after.format != "copc" and f"{PROGRAM} wrote {after.format.upper()} and no COPC",
+        after.format != "copc" and f"{PROGRAM} wrote {after.format.upper()} and not COPC",
         after.n_points != before.n_points
         and f"it has {after.n_points} points in place of {before.n_points}",
         after.scales != before.scales

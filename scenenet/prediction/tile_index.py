@@ -26,8 +26,8 @@ INDEX_SUFFIXES = ITEM_SUFFIXES | {".gpkg"}
 COLUMNS = ("location", "path", "filename")
 """Columns of a GeoPackage that can have the files; ``pdal tindex`` writes the first one."""
 REMOTE = re.compile(r"/vsi|(?!file:)[a-z][a-z0-9+.-]+:/", re.IGNORECASE)
-"""Start of a place that is no local file: a URL, or a virtual file of GDAL. One letter before the
-colon is a drive."""
+"""Start of a place that is not a local file: a URL, or a virtual file of GDAL. One letter before
+the colon is a drive."""
 NAMED = 5
 """Most entries that a message names one by one."""
 LONGEST_NAME, LONGEST = 200, 2000
@@ -41,7 +41,7 @@ class TileIndex:
 
     Attributes:
         files: the files, each once, in the order of the index; whether they exist is not looked at.
-        refused: entries that are no local file, under their names, with the reason.
+        refused: entries that are not local files, under their names, with the reason.
         notes: what looks wrong about the index, as sentences.
     """
 
@@ -65,7 +65,7 @@ def read_index(path: Path) -> TileIndex:
     ``pdal tindex`` writes what its command line named; they count where the first do not exist.
 
     Raises:
-        InputError: the file is no tile index, names no file, or is one page of several.
+        InputError: the file is not a tile index, names no file, or is one page of several.
     """
     table = path.suffix.lower() == ".gpkg"
     entries = list(_rows(path) if table else _items(path))
@@ -95,12 +95,12 @@ def _items(path: Path) -> Iterator[_Entry]:
     except OSError as error:
         raise InputError(error.strerror or "cannot be read", file=path) from None
     except (ValueError, RecursionError) as error:
-        raise InputError(f"the tile index is no JSON ({error})", file=path) from None
+        raise InputError(f"the tile index is not JSON ({error})", file=path) from None
     items = data.get("features", [data]) if isinstance(data, dict) else None
     if not isinstance(items, list) or not any(_assets(item) for item in items):
         kind = data.get("type") if isinstance(data, dict) else None
         raise InputError(
-            "this is no tile index: no item in it has assets"
+            "this is not a tile index: no item in it has assets"
             + (f" (its type is {kind!r})" if kind else ""),
             file=path,
             remedy="Give a virtual point cloud (.vpc) or a STAC item collection, with its items in "
@@ -109,7 +109,7 @@ def _items(path: Path) -> Iterator[_Entry]:
     links = data["links"] if isinstance(data.get("links"), list) else []
     if any(isinstance(link, dict) and link.get("rel") == "next" for link in links):
         raise InputError(
-            "the item collection goes on in another file (a link with rel next)",
+            "the item collection continues in another file (a link with rel next)",
             file=path,
             remedy="Write all its items into one file",
         )
@@ -165,21 +165,22 @@ def _rows(path: Path) -> Iterator[_Entry]:
     except RuntimeError as error:
         raise InputError(f"the tile index cannot be read ({error})", file=path) from None
     raise InputError(
-        f"this is no tile index: no layer has a column {', '.join(COLUMNS[:-1])} or {COLUMNS[-1]}",
+        "this is not a tile index: no layer has a column "
+        f"{', '.join(COLUMNS[:-1])} or {COLUMNS[-1]}",
         file=path,
         remedy="Write it with pdal tindex create, or name the column location",
     )
 
 
 def _problem(href: str | None) -> str:
-    """Why an entry is no local LAS or LAZ file; empty if it is one."""
+    """Why an entry is not a local LAS or LAZ file; empty if it is one."""
     if not href:
         return "the entry names no file"
     shown = (href if href.isprintable() else ascii(href))[:LONGEST_NAME]
     if REMOTE.match(href):
         return f"{shown} is not on this machine; download it first"
     if _suffix(href) not in SUFFIXES:
-        return f"{shown} is no LAS or LAZ file"
+        return f"{shown} is not a LAS or LAZ file"
     sizes = [len(part.encode("utf-8", "replace")) for part in Path(href).parts]
     if not href.isprintable() or max(sizes) > LONGEST_NAME or sum(sizes) > LONGEST:
         return f"{shown} cannot be the name of a file"
@@ -207,6 +208,6 @@ def _repeated(again: Mapping[Path, int]) -> Iterable[str]:
         names = ", ".join(path.name for path in list(again)[:NAMED])
         more = f" and {len(again) - NAMED} more" if len(again) > NAMED else ""
         yield (
-            f"files that are listed again are read once: {names}{more}; entries left out: "
-            f"{sum(again.values())}"
+            f"files that are listed more than once are read once: {names}{more}; repeated entries "
+            f"left out: {sum(again.values())}"
         )

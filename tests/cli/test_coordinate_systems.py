@@ -114,7 +114,9 @@ def test_what_is_no_system_is_a_wrong_usage(call, pole_survey, pole_model, tmp_p
     text = str(pole_survey) if text == "field.laz" else text
     done = call(command, pole_survey, "--crs", text, *out)
     assert done.code == 2
-    assert "is no coordinate system with x and y" in " ".join(done.err.replace("│", " ").split())
+    assert "is neither a coordinate system with x and y" in " ".join(
+        done.err.replace("│", " ").split()
+    )
 
 
 def test_a_system_may_be_a_file_with_its_wkt(call, pole_survey, tmp_path):

@@ -59,9 +59,9 @@ def test_the_system_of_a_new_survey_may_be_named(root):
         "EPSG:32629+5703", None, None,
     ]  # fmt: skip
     for system, role, expected in (
-        ("EPSG:99999", "new", "crs 'EPSG:99999' is no coordinate system with x and y"),
-        ("EPSG:5703", "new", "crs 'EPSG:5703' is no coordinate system with x and y"),
-        ("EPSG:32629", "train", "crs is only for new surveys"),
+        ("EPSG:99999", "new", "crs 'EPSG:99999' is not a coordinate system with x and y"),
+        ("EPSG:5703", "new", "crs 'EPSG:5703' is not a coordinate system with x and y"),
+        ("EPSG:32629", "train", "crs is only for the role new"),
     ):
         row = f"north\tdata/north.laz\tedp\t{role}\t{system}"
         assert f"line 2: {expected}" in complaint(root, row, header=header)

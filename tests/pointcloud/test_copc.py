@@ -59,7 +59,7 @@ def test_a_file_that_lacks_something_is_refused(survey, make_las):
     with pytest.raises(InputError) as caught:
         check_copc(survey, other)
     for words in (
-        "LAZ and no COPC", "4999 points in place of 5000", "its steps are",
+        "LAZ and not COPC", "4999 points in place of 5000", "its steps are",
         "lacks the dimensions tower_probability, height above ground", "the coordinate system",
     ):  # fmt: skip
         assert words in str(caught.value)

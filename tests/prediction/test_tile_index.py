@@ -118,7 +118,7 @@ def test_entries_that_are_no_local_file_are_named_and_stop_no_other(tiles, tmp_p
         "item 8",
     ]  # fmt: skip
     assert "https://example.org/c.laz?token=1 is not on this machine" in problems["item 1 (c)"]
-    assert "line.vpc: item 3 (d): ./ept.json is no LAS or LAZ file" in problems["item 3 (d)"]
+    assert "line.vpc: item 3 (d): ./ept.json is not a LAS or LAZ file" in problems["item 3 (d)"]
     for name in ("item 4 (e)", "item 5 (f)", "item 8"):
         assert "names no file" in problems[name]
     for name in ("item 6 (g)", "item 7 (h)"):
@@ -141,15 +141,16 @@ def test_a_file_that_is_listed_twice_is_read_once_and_counted(tiles, tmp_path):
     found = read_index(collection(tmp_path / "x.vpc", *map(item, hrefs)))
     assert found.files == (tiles / "a.laz", tiles / "b.las")
     assert found.notes == (
-        "files that are listed again are read once: a.laz, b.las; entries left out: 3",
+        "files that are listed more than once are read once: a.laz, b.las; "
+        "repeated entries left out: 3",
     )
 
 
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("{", "no JSON"),
-        ("[" * 100_000, "no JSON"),
+        ("{", "not JSON"),
+        ("[" * 100_000, "not JSON"),
         ('{"type": "Collection", "links": []}', "no item in it has assets.*'Collection'"),
         ('{"type": "FeatureCollection", "features": []}', "no item in it has assets"),
         ('{"features": [{"type": "Feature", "properties": {}}]}', "no item in it has assets"),
@@ -165,7 +166,7 @@ def test_other_json_is_no_index(tmp_path, text, reason):
 def test_one_page_of_an_item_collection_is_refused(tiles, tmp_path):
     links = [{"rel": "self", "href": "x"}, {"rel": "next", "href": "https://example.org/2"}]
     index = collection(tmp_path / "x.json", item("./tiles/a.laz"), links=links)
-    with pytest.raises(InputError, match="goes on in another file"):
+    with pytest.raises(InputError, match="continues in another file"):
         SurveyFiles.of(index)
 
 
@@ -210,7 +211,7 @@ def test_the_tiles_of_an_index_are_predicted_as_one_survey(scene, model, tmp_pat
         survey, model, files, PredictSettings(), DetectionSettings(min_conductor=0)
     )
     assert (summary.towers, summary.points) == (2, len(cloud))
-    assert summary.warnings[0].endswith("read once: east.laz; entries left out: 1")
+    assert summary.warnings[0].endswith("read once: east.laz; repeated entries left out: 1")
     with files.status.open(newline="") as stream:
         table = {row["file"]: row for row in csv.DictReader(stream)}
     assert {name: row["status"] for name, row in table.items()} == {

@@ -73,7 +73,7 @@ class StudySettings(Settings):
         """The seeds of each job, by the name of the job, such as ``seeds-0-3``.
 
         Args:
-            trainings: that a job runs about; a job has one seed or more, and all variants of each.
+            trainings: about how many a job runs; it has all variants of each of its seeds.
         """
         each = max(1, trainings // len(self.all_variants()))
         groups = [self.seeds[first : first + each] for first in range(0, len(self.seeds), each)]

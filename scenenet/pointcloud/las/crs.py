@@ -107,7 +107,7 @@ def named_system(text: str) -> pyproj.CRS:
         crs = None
     if crs is None or len(crs.axis_info) < 2:
         raise InputError(
-            f"{text!r} is no coordinate system with x and y",
+            f"{text!r} is not a coordinate system with x and y",
             remedy="Name one such as EPSG:32629, or EPSG:32629+5703 with heights",
         )
     return crs

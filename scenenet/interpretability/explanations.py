@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from scenenet.detection.conductor_rules import FAR
+from scenenet.detection.conductor_rules import FAR, WIDE, WIDEST_HEAD_M
+from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
@@ -17,6 +18,13 @@ from scenenet.pointcloud.units import METRE, SYMBOLS
 
 NEGLIGIBLE = 0.01
 """Absolute share of a GENEO below which the explanation does not state its side."""
+
+WIDEST_ARM = WIDE * float(DetectionSettings.model_fields["crossarm"].default)
+"""Widest reach of crossarms from the axis, as a share of the height."""
+
+FEW_POINTS_PER_M = 5.0
+"""Own points per m of height below which the shape of a tower is hard to see. At 10 points per m2
+poles and pylons have 14 and more, at 2 points per m2 a pole has 1 to 5."""
 
 UNDETERMINED = "no meaning: the training crops do not determine it"
 """What stands in place of the meaning of a number that could as well have another value."""
@@ -112,21 +120,30 @@ def _evidence(tower: SurveyTower, units: _Units) -> tuple[str, ...]:
     return (
         f"it is {tower.height:.0f} {units.vertical} tall, on ground at {tower.base:.0f} "
         f"{units.vertical}",
-        f"its body is {tower.width:.0f} {units.planar} wide where nothing touches it",
+        f"its body is {tower.width:.1f} {units.planar} wide where nothing touches it",
         conductors,
     )
 
 
 def _doubts(tower: SurveyTower, tau: float | None, units: _Units) -> tuple[str, ...]:
+    """Why a person should check a tower. A tower without any of these reasons is not doubtful."""
     doubts = []
     to_edge = tower.edge_distance * units.planar_m
-    if to_edge < tower.height * units.vertical_m:
+    height = tower.height * units.vertical_m
+    if to_edge < min(WIDEST_ARM * height, WIDEST_HEAD_M):
         doubts.append(
-            f"it is {tower.edge_distance:.0f} {units.planar} from the edge of the data, less than "
-            "its height: part of it may be missing"
+            f"it is {tower.edge_distance:.0f} {units.planar} from the edge of the data, nearer "
+            "than crossarms may reach: part of it may be missing"
         )
+    if tower.conductor_directions == 0:
+        doubts.append("no conductors were found that leave it: a lone pole or tree looks alike")
     if tower.conductor_directions == 1 and to_edge >= FAR:
         doubts.append("conductors leave it in one direction only: the end of a line, or no tower")
+    if tower.points < FEW_POINTS_PER_M * height:
+        doubts.append(
+            f"it has {tower.points} points of its own, fewer than {FEW_POINTS_PER_M:.0f} per m of "
+            "its height: its shape is hard to see"
+        )
     if tau is not None and tower.probability < tau:
         doubts.append(
             f"its probability is below tau, {tau:.3f}: its conductors and its body support it"

@@ -98,6 +98,15 @@ class SurveyPrediction:
         """Names of the GENEOs that the shares belong to; empty for a model without GENEOs."""
         return self.tiles.geneos
 
+    @property
+    def spool(self) -> TileSpool:
+        """Its voxels and points, by tiles of voxels."""
+        return self.tiles.spool
+
+    def owner(self, xyz: np.ndarray) -> np.ndarray:
+        """(n,) uint32, id of the tower whose shape has each of the points (n, 3) m, 0 for none."""
+        return self.tiles.owner(xyz)
+
     def look_up(self, xyz: np.ndarray) -> PointPredictions:
         """Probability, tower id and shares of points (n, 3) of the survey, in its units."""
         return self.tiles.look_up(in_metres(xyz, self.unit_sizes))

@@ -31,8 +31,8 @@ class PredictionSummary:
         seconds: time of the prediction, files included, s.
         settings: settings of the prediction, with those of ``detection``.
         model_provenance: provenance of the model.
-        outputs: path -> fingerprint of the classified points and of the tower lists. A later
-            prediction replaces these files only if they are unchanged.
+        outputs: path -> fingerprint of the classified points, the tower lists and the page. A
+            later prediction replaces these files only if they are unchanged.
     """
 
     survey: str

@@ -137,7 +137,7 @@ class TilePredictions:
             place = np.array([tower.x, tower.y])
             near = points(place, tower.structure.reach)
             own = near[tower.structure.contains(near)]
-            own = own[self._owner(own) == 0]  # points in two shapes belong to the earlier tower
+            own = own[self.owner(own) == 0]  # points in two shapes belong to the earlier tower
             self._number(own, number)
             self._structures.append((number, tower.structure))
             distance = edge_distance(place, occupied(place, MAX_M * 1.5)[:, :2])
@@ -159,7 +159,7 @@ class TilePredictions:
             shares[rows] = prediction.shares[at]
         # A voxel with a tower's points may have others, and those of a second tower.
         rows = np.flatnonzero(tower)
-        tower[rows] = self._owner(xyz[rows])
+        tower[rows] = self.owner(xyz[rows])
         return PointPredictions(probability, tower, shares)
 
     def _detected(self, threshold: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -196,10 +196,16 @@ class TilePredictions:
             },
         )
 
-    def _owner(self, xyz: np.ndarray) -> np.ndarray:
+    def owner(self, xyz: np.ndarray) -> np.ndarray:
         """(n,) uint32, id of the first tower whose shape has each of the points (n, 3) m, or 0."""
         owner = np.zeros(len(xyz), np.uint32)
+        if not len(xyz):
+            return owner
+        (west, south), (east, north) = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
         for number, structure in self._structures:
+            x, y, reach = structure.x, structure.y, structure.reach
+            if not (west - reach <= x <= east + reach and south - reach <= y <= north + reach):
+                continue
             away = np.hypot(xyz[:, 0] - structure.x, xyz[:, 1] - structure.y)
             rows = np.flatnonzero((owner == 0) & (away <= structure.reach))
             owner[rows[structure.contains(xyz[rows])]] = number

@@ -19,6 +19,7 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud import add_dimensions
 from scenenet.pointcloud.copc import SUFFIX, write_copc
 from scenenet.prediction.file_status import SurveyFile, write_status
+from scenenet.prediction.page.survey_page import PAGE_BYTES, write_page
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
@@ -46,6 +47,7 @@ class PredictionFiles:
             (LAZ).
         geopackage, geojson, table: the tower list (``scenenet.prediction.tower_lists``).
         summary: ``PredictionSummary`` (JSON).
+        page: the page of the survey (HTML); None for no page.
         status: a row per file of the survey (CSV); None for a survey that is one file.
         copc: whether each file of the points is also written as COPC (``copc_of``).
     """
@@ -55,6 +57,7 @@ class PredictionFiles:
     geojson: Path
     table: Path
     summary: Path
+    page: Path | None = None
     status: Path | None = None
     copc: bool = False
 
@@ -76,15 +79,16 @@ class PredictionFiles:
             geojson=folder / f"{survey.name}.towers.geojson",
             table=folder / f"{survey.name}.towers.csv",
             summary=folder / f"{survey.name}.summary.json",
+            page=folder / f"{survey.name}.html",
             status=place / "status.csv" if survey.tiled else None,
             copc=copc,
         )
 
     @property
     def lists(self) -> tuple[Path, ...]:
-        """The tower list in its formats, and the status."""
-        lists = (self.geopackage, self.geojson, self.table)
-        return lists if self.status is None else (*lists, self.status)
+        """The tower list in its formats, the page, and the status."""
+        named = (self.geopackage, self.geojson, self.table, self.page, self.status)
+        return tuple(path for path in named if path is not None)
 
     def outputs(self) -> list[Output]:
         lists = [Output(path, self.is_own) for path in (*self.lists, self.summary)]
@@ -141,6 +145,7 @@ def require_space(surveys: Sequence[Mapping[Path, int]], out: Path, *, copc: boo
     """
     sizes = [(path.stat().st_size, points) for files in surveys for path, points in files.items()]
     results = sum(size + RESULT_BYTES * points for size, points in sizes) * (2 if copc else 1)
+    results += PAGE_BYTES * len(surveys)
     scratch = SCRATCH_BYTES * max((sum(files.values()) for files in surveys), default=0)
     check_space({out: results, temporary_directory(): scratch})
 
@@ -183,13 +188,16 @@ def predict_to_files(
                 copc = stack.enter_context(atomic(copc_of(target)))
                 write_copc(partial, copc)
                 written[files.key(copc_of(target))] = fingerprint(copc)
-        lists = [stack.enter_context(atomic(path)) for path in files.lists]
+        lists = {path: stack.enter_context(atomic(path)) for path in files.lists}
         record = stack.enter_context(atomic(files.summary))
         prediction = replace(prediction, files=read)
-        write_towers(prediction, *lists[:3])
+        of_towers = (files.geopackage, files.geojson, files.table)
+        write_towers(prediction, *(lists[path] for path in of_towers))
+        if files.page is not None:
+            write_page(prediction, lists[files.page])
         if files.status is not None:
-            write_status(lists[3], prediction.files)
-        written |= {files.key(p): fingerprint(f) for p, f in zip(files.lists, lists, strict=True)}
+            write_status(lists[files.status], prediction.files)
+        written |= {files.key(path): fingerprint(partial) for path, partial in lists.items()}
         summary = summarise(prediction, written)
         write_json(record, summary.to_json())
     files.unfinished.unlink(missing_ok=True)

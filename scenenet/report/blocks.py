@@ -61,6 +61,15 @@ class Text:
 
 
 @dataclass(frozen=True)
+class Link:
+    """A link to another file of the run; ``address`` is from the folder of the page."""
+
+    text: str
+    address: str
+    kind: str = "link"
+
+
+@dataclass(frozen=True)
 class Notes:
     """A list of notes, such as the warnings of a check."""
 
@@ -116,7 +125,7 @@ class Heading:
     kind: str = "heading"
 
 
-Block = Text | Notes | Facts | Table | Figure | Scene | Heading
+Block = Text | Link | Notes | Facts | Table | Figure | Scene | Heading
 
 
 @dataclass

@@ -6,10 +6,12 @@ results for it. ``scenenet.report.page`` has their order.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from urllib.parse import quote
 
 import pandas as pd
 
@@ -27,10 +29,12 @@ class ReportContext:
     Attributes:
         results: the result folder.
         thesis: published numbers.
+        folder: of the page, for links to other files; None for no links.
     """
 
     results: Results
     thesis: Thesis
+    folder: Path | None = None
 
     @cached_property
     def pictures(self) -> list[Picture]:
@@ -55,6 +59,12 @@ class ReportContext:
             return None
         frame = read_table(path)
         return None if frame.empty else frame
+
+    def address(self, file: Path) -> str | None:
+        """Where the page finds another file; None if there is no such file, or no links."""
+        if self.folder is None or not file.exists():
+            return None
+        return quote(Path(os.path.relpath(file.resolve(), self.folder.resolve())).as_posix())
 
     def path(self, name: str) -> Path:
         """The file of a table."""

@@ -59,7 +59,8 @@ def write_report(
     Args:
         results: the result folder; its ``tables`` and ``figures`` are shown as they are.
         thesis: published numbers.
-        out: HTML file to write; needs no other file and no network.
+        out: HTML file to write; needs no other file and no network. It links to the pages of
+            classified surveys.
         title: of the page.
 
     Returns:
@@ -68,7 +69,7 @@ def write_report(
     Raises:
         InputError: a result file is broken, or a figure is missing.
     """
-    context = ReportContext(results, thesis)
+    context = ReportContext(results, thesis, Path(out).parent)
     made = [section for make in SECTIONS if (section := make(context)) is not None]
     write_text(out, render(made, title, "scenenet report", thesis.source))
     return made

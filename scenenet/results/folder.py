@@ -93,10 +93,12 @@ class Prediction:
     Attributes:
         summary: what was classified, with which model.
         towers: the tower list.
+        page: its page, if there is one.
     """
 
     summary: PredictionSummary
     towers: Sequence[SurveyTower]
+    page: Path
 
 
 @dataclass(frozen=True)
@@ -278,7 +280,8 @@ class Results:
         summary, towers = folder / f"{survey}.summary.json", folder / f"{survey}.towers.geojson"
         if not summary.exists() and not towers.exists():
             return None
-        return Prediction(read_typed(summary, PredictionSummary.from_json), read_towers(towers))
+        read = read_typed(summary, PredictionSummary.from_json)
+        return Prediction(read, read_towers(towers), folder / f"{survey}.html")
 
     def provenances(self) -> list[tuple[str, Mapping[str, Any]]]:
         """Every provenance record with its path in the result folder, sorted.

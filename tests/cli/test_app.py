@@ -122,7 +122,7 @@ def test_predict_writes_the_files_of_a_survey(survey, model, tmp_path):
     names = {f.name for f in tmp_path.iterdir()}
     assert names == {
         "corridor.laz", "corridor.gpkg", "corridor.towers.csv", "corridor.towers.geojson",
-        "corridor.summary.json",
+        "corridor.html", "corridor.summary.json",
     }  # fmt: skip
     summary = json.loads((tmp_path / "corridor.summary.json").read_text())
     assert json.loads(done.stdout) == [summary]

@@ -67,7 +67,7 @@ def test_an_unchanged_prediction_is_replaced_and_a_changed_one_is_not(
     assert call(*predict).code == 0
     summary = json.loads((out / "field.summary.json").read_text())
     assert set(summary["outputs"]) == {
-        "field.laz", "field.gpkg", "field.towers.csv", "field.towers.geojson",
+        "field.laz", "field.gpkg", "field.html", "field.towers.csv", "field.towers.geojson",
     }  # fmt: skip
     edited = laspy.read(out / "field.laz")
     edited.classification[:] = 1

@@ -32,7 +32,7 @@ def explain(pole_finder):
 def test_the_measurements_are_given_in_words(explain):
     evidence = " ".join(explain().evidence)
     assert "21 m tall" in evidence
-    assert "2 m wide" in evidence
+    assert "1.9 m wide" in evidence
     assert "71° and 251°" in evidence
 
 
@@ -51,7 +51,10 @@ def test_a_tower_in_the_middle_of_a_line_raises_no_doubt(explain):
     ("changes", "words"),
     [
         (ONE_SIDE, "one direction"),
-        ({"edge_distance": 12.0}, "may be missing"),
+        ({"edge_distance": 9.0}, "may be missing"),
+        ({"height": 60.0, "edge_distance": 19.0}, "may be missing"),
+        ({"conductor_directions": 0, "conductor_bearings": ()}, "no conductors"),
+        ({"points": 100}, "100 points of its own"),
         ({"probability": 0.6}, "below tau"),
         ({"probability": 0.8}, "not far above tau"),
     ],
@@ -75,17 +78,18 @@ def test_lengths_are_named_in_the_units_of_the_survey(explain):
     mixed, feet = explain(*MIXED), explain(*FEET)
     assert (mixed.unit, mixed.vertical_unit) == ("metre", "foot")
     assert "21 ft tall, on ground at 104 ft" in mixed.evidence[0]
-    assert "2 m wide" in mixed.evidence[1]
+    assert "1.9 m wide" in mixed.evidence[1]
     assert "21 US survey ft tall" in feet.evidence[0]
-    assert "2 US survey ft wide" in feet.evidence[1]
+    assert "1.9 US survey ft wide" in feet.evidence[1]
     assert explain().unit == "metre"
 
 
 def test_units_do_not_change_the_doubts(explain):
-    # 12 m from the edge, and 21.4 ft are 6.5 m.
-    assert explain(*MIXED, edge_distance=12.0).doubts == ()
-    [doubt] = explain(*FEET, edge_distance=12.0).doubts
-    assert "12 US survey ft from the edge" in doubt
+    # 9 m from the edge, and crossarms of a tower of 21.4 ft reach at most 2.9 m.
+    assert explain(*MIXED, edge_distance=9.0).doubts == ()
+    assert explain(*FEET, edge_distance=10.0).doubts == ()
+    [doubt] = explain(*FEET, edge_distance=9.0).doubts
+    assert "9 US survey ft from the edge" in doubt
     # The edge is 50 ft away, nearer than the 20 m in which conductors must be seen.
     tall = {"height": 10.0, "edge_distance": 50.0}
     assert explain(*FEET, **ONE_SIDE, **tall).doubts == ()

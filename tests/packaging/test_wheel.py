@@ -17,7 +17,7 @@ import pytest
 pytestmark = pytest.mark.packaging
 
 LIMIT_S = 600
-ENDINGS = ("laz", "gpkg", "towers.csv", "towers.geojson", "summary.json")
+ENDINGS = ("laz", "gpkg", "towers.csv", "towers.geojson", "summary.json", "html")
 """Of the files of a prediction."""
 NOT_IN_THE_CORE = ("matplotlib", "mlflow", "snakemake")
 """Distributions that only extras bring; jinja2 and pygments come with torch and rich."""

@@ -126,7 +126,7 @@ def test_each_file_is_written_under_its_name_and_the_lists_once(uncut, model, tm
         path.relative_to(tmp_path / "out").as_posix() for path in (tmp_path / "out").rglob("*.*")
     }
     written = {f"tiles/{path.name}" for path in tiles.iterdir()} | {"tiles/status.csv"}
-    endings = ("gpkg", "summary.json", "towers.csv", "towers.geojson")
+    endings = ("gpkg", "html", "summary.json", "towers.csv", "towers.geojson")
     assert names == written | {f"tiles.{ending}" for ending in endings}
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fixtures.browser import CONTRASTS, INK, opened
 
 from scenenet.experiments.published import Thesis
 from scenenet.figures.interactive_crop import write_interactive_crop
@@ -18,41 +18,6 @@ from scenenet.results.interactive_crop import InteractiveCrop
 SCHEMES = pytest.mark.parametrize("scheme", ["light", "dark"])
 PHONE_PX = 390
 
-INK = """canvas => {
-  const pixels = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
-  let sum = 0;
-  for (let i = 3; i < pixels.length; i += 4) sum += pixels[i] > 0;
-  return sum;
-}"""
-"""Pixels of a canvas that are not empty."""
-
-CONTRASTS = """() => {
-  const parts = (colour) => colour.match(/[\\d.]+/g).map(Number);
-  const light = (colour) => {
-    const [r, g, b] = parts(colour).map((part) => part / 255)
-      .map((part) => part <= 0.04045 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const behind = (element) => {
-    for (let one = element; one; one = one.parentElement) {
-      const colour = getComputedStyle(one).backgroundColor;
-      const opacity = parts(colour)[3];
-      if (opacity === undefined || opacity === 1) return colour;
-    }
-    return "rgb(255, 255, 255)";
-  };
-  const found = {};
-  for (const one of document.querySelectorAll("h1, h2, h3, p, td, th button, figcaption, nav a")) {
-    if (!one.textContent.trim() || !one.offsetParent) continue;
-    const both = [light(getComputedStyle(one).color), light(behind(one))];
-    const [low, high] = both.sort((a, b) => a - b);
-    const name = one.tagName.toLowerCase();
-    found[name] = Math.min(found[name] ?? 21, (high + 0.05) / (low + 0.05));
-  }
-  return found;
-}"""
-"""Lowest contrast of text with its background, by kind of element (WCAG 2)."""
-
 
 @pytest.fixture
 def scene(page: Path, results: Results, thesis: Thesis) -> InteractiveCrop:
@@ -62,23 +27,6 @@ def scene(page: Path, results: Results, thesis: Thesis) -> InteractiveCrop:
     )
     write_report(results, thesis, page)
     return made
-
-
-@contextlib.contextmanager
-def opened(pictures, file: Path, **window):
-    """The page, which must not request anything or report an error while it is used."""
-    faults, asked = [], []
-    with pictures.browsing(**window) as tab:
-        tab.on("pageerror", lambda error: faults.append(str(error)))
-        tab.on(
-            "console",
-            lambda message: faults.append(message.text) if message.type == "error" else None,
-        )
-        tab.on("request", lambda request: asked.append(request.url))
-        tab.goto(file.as_uri())
-        yield tab
-    assert faults == []
-    assert [url for url in asked if not url.startswith("data:")] == [file.as_uri()]
 
 
 @SCHEMES

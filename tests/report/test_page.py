@@ -66,6 +66,14 @@ def test_the_page_needs_no_other_file(page: Path):
     assert "@import" not in html
 
 
+def test_the_page_of_a_classified_survey_is_linked(page: Path, results: Results, thesis: Thesis):
+    survey = results.folder / "predict" / "fresh" / "fresh.html"
+    survey.write_text("<p>a map", encoding="utf-8")
+    write_report(results, thesis, page)
+    [address] = [a["href"] for a in read(page).all("a") if not a["href"].startswith("#")]
+    assert (page.parent / address).resolve() == survey.resolve()
+
+
 def test_every_picture_is_in_the_page_with_an_alternative_text(page: Path):
     images = read(page).all("img")
     assert len(images) == 3

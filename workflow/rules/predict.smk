@@ -23,6 +23,7 @@ rule predict:
             "Files",
             {"survey": "{survey}", "file": "Summary"},
         ),
+        page=f"{R}/predict/{{survey}}/{{survey}}.html",
         provenance=f"{R}/predict/{{survey}}/provenance.json",
     log:
         f"{R}/logs/predict/{{survey}}.log",

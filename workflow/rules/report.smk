@@ -45,6 +45,7 @@ rule report:
         checks=every("check", "report"),
         towers=every("predict", "geojson"),
         summaries=every("predict", "summary"),
+        pages=every("predict", "page"),
         records=every_record(),
         thesis=ancient(own_file(settings.thesis)),
     output:

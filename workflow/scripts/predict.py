@@ -17,7 +17,7 @@ def predict(job: _job.Job) -> None:
     given = job.identity.get("crs")
     crs = None if given is None else named_system(given)
     require_space([{survey: survey_of_lengths(survey, crs).n_points}], Path(output.points))
-    lists = (Path(output[name]) for name in ("geopackage", "geojson", "table", "summary"))
+    lists = (Path(output[name]) for name in ("geopackage", "geojson", "table", "summary", "page"))
     predict_to_files(
         SurveyFiles.of(survey, crs),
         job.input.model,

@@ -81,6 +81,9 @@ def command(
     probability, in the units of the survey. GeoJSON is in longitude and latitude where the CRS is
     known.
 
+    NAME.html: a page with a map, the list of the towers, and each tower in plan and profile with
+    its reasons and what to check. It needs no other file and no network.
+
     NAME.summary.json: counts, settings and time.
 
     A file that exists is replaced only if an earlier prediction wrote it and nothing changed it.

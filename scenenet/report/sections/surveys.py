@@ -16,6 +16,7 @@ from scenenet.report.blocks import (
     Facts,
     Format,
     Heading,
+    Link,
     Section,
     Table,
     Text,
@@ -66,6 +67,9 @@ def predictions(context: ReportContext) -> Section | None:
             if (value := getattr(found.summary, name)) is not None
         ]
         blocks += [Heading(survey), Facts(facts)]
+        address = context.address(found.page)
+        if address is not None:
+            blocks.append(Link("Map, list and picture of each tower", address))
         blocks += context.figures_of(survey, "predictions")
         blocks.append(_tower_list(survey, found.towers))
     if not blocks:

@@ -148,6 +148,14 @@ def take_page(report: Path, out: Path) -> None:
         save(page.screenshot(), out / "report.png")
 
 
+def take_survey(survey: Path, out: Path) -> None:
+    """The page of a survey with its second tower selected, light."""
+    with browsing(width=1400, height=1250) as page:
+        page.goto(survey.resolve().as_uri())
+        page.get_by_role("button", name="Next").click()
+        save(page.screenshot(), out / "survey.png")
+
+
 def take_experiments(store: Tracked, out: Path) -> None:
     """The list of experiments, one for each study."""
     with browsing(height=520) as page:
@@ -248,9 +256,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--results", type=Path, default=Path("results"), help="result folder")
     parser.add_argument("--uri", default="sqlite:///mlflow.db", help="MLflow store of the run")
     parser.add_argument("--out", type=Path, default=IMAGES, help="where the pictures go")
+    parser.add_argument(
+        "--survey", type=Path, help="take only this page, which scenenet predict has written"
+    )
     asked = parser.parse_args(arguments)
     try:
-        take(asked.results, asked.uri, asked.out)
+        if chromium() is None:
+            raise InputError("there is no Chromium", remedy="apt install chromium")
+        if asked.survey is not None:
+            take_survey(asked.survey, asked.out)
+        else:
+            take(asked.results, asked.uri, asked.out)
     except InputError as error:
         sys.exit(f"Error: {error}")
 
@@ -259,16 +275,16 @@ def take(results: Path, uri: str, out: Path) -> None:
     """Take every picture.
 
     Raises:
-        InputError: there is no Chromium, no page, or the store has not the studies.
+        InputError: there is no page, or the store has not the studies.
     """
     from mlflow import MlflowClient
 
-    if chromium() is None:
-        raise InputError("there is no Chromium", remedy="apt install chromium")
     report = results / "report" / "index.html"
     if not report.is_file():
         raise InputError("is not there", file=report, remedy="Run the workflow first: snakemake")
     take_page(report, out)
+    for survey in sorted(results.glob("predict/*/*.html"))[:1]:
+        take_survey(survey, out)
     with serving(uri) as address:
         store = Tracked(MlflowClient(address), address)
         for take_some in (take_experiments, take_runs, take_seeds, take_grid):

@@ -129,6 +129,8 @@ def test_the_list_sorts_and_filters(pictures, line_page):
 
 def test_the_map_zooms_and_moves_and_says_its_scale(pictures, line_page):
     with opened(pictures, line_page, width=1400) as tab:
+        rounded = tab.evaluate("[1, 9.99, 700, 999.9999999999999, 0.05].map(round)")
+        assert rounded == pytest.approx([1, 5, 500, 500, 0.05])
         scale = "plan.scale"
         whole = tab.evaluate(scale)
         tab.locator("#zoom-in").click()

@@ -101,6 +101,8 @@ def thinned(xyz: np.ndarray, most: int) -> np.ndarray:
     """
     if len(xyz) <= most:
         return xyz
+    # Not the lowest point of each cell: trees would look like shelves.
+    xyz = np.random.default_rng(0).permutation(xyz)
     offsets = xyz - xyz.min(axis=0)
     # Points lie on surfaces: about as many cells as points of the result cover the widest one.
     cell = max(STEP_M, float(np.sqrt(np.prod(np.sort(offsets.max(axis=0))[1:]) / most)) / 4)

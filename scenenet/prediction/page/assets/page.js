@@ -9,7 +9,8 @@ let chosen = null;
 // The largest of 1, 2, 5, 10, 20, ... that is not above a number.
 function round(number) {
   const power = 10 ** Math.floor(Math.log10(number));
-  return [5, 2, 1].find((step) => step * power <= number) * power;
+  // The logarithm may be rounded up to the next power.
+  return [5, 2, 1, 0.5].find((step) => step * power <= number) * power;
 }
 
 // A length of a round number as text, without rounding errors.
@@ -322,10 +323,13 @@ function drawView(canvas, tower, view) {
   const { xyz, n, own } = pointsOf(tower);
   const u = new Float32Array(n), v = new Float32Array(n);
   for (let i = 0; i < n; i++) [u[i], v[i]] = view.of(xyz[3 * i], xyz[3 * i + 1], xyz[3 * i + 2]);
-  // A profile shows the whole tower, and the ground of a slope as far as there is room.
-  const low = view.level ? -tower.radius_m : -0.12 * tower.height_m - 2;
-  const high = view.level ? tower.radius_m : 1.12 * tower.height_m + 1;
-  const room = 22, scale = Math.min((height - 2 * room) / (high - low), (width - 16) / (2 * tower.radius_m) * (view.level ? 1 : 1.6));
+  // The plan shows all points. A profile shows the whole tower, and of its surroundings the nearer
+  // ones, because it is narrow.
+  const furthest = (all) => all.reduce((most, one) => Math.max(most, Math.abs(one)), 3);
+  const reach = view.level ? Math.max(furthest(u), furthest(v)) : furthest(u) / 1.6;
+  const low = view.level ? -reach : -0.12 * tower.height_m - 2;
+  const high = view.level ? reach : 1.12 * tower.height_m + 1;
+  const room = 22, scale = Math.min((height - 2 * room) / (high - low), (width - 16) / (2 * reach));
   const px = (across) => width / 2 + scale * across;
   const py = (up) => height / 2 - scale * (up - (low + high) / 2);
   const dots = (from, to, side) => {

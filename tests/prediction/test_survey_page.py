@@ -25,7 +25,7 @@ from scenenet.prediction.page.pictures import (
     thinned,
     tower_pictures,
 )
-from scenenet.prediction.page.survey_page import LISTED, not_seen, survey_page
+from scenenet.prediction.page.survey_page import LISTED, MOST_WARNINGS, not_seen, survey_page
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.writers import PredictionFiles, predict_to_files
@@ -90,7 +90,7 @@ def test_names_of_files_cannot_become_markup(line_with_a_broken_file, model):
         more = survey_page(replace(prediction, files=(*prediction.files, left_out)), [])
     assert "<img" not in page
     assert "&lt;img src=x onerror=alert(1)&gt; &amp; &#x27;quotes&quot;.laz" in page
-    assert "1 files were not used" in page
+    assert "not used: 1 of 3 files" in page
     for label, number in (("files read", 2), ("files failed", 1), ("files left out", 1)):
         assert f"<dt>{label}</dt><dd>{number}</dd>" in more
 
@@ -107,6 +107,19 @@ def test_a_survey_without_towers_has_a_page(line, model):
         page = survey_page(replace(prediction, towers=()), [])
     assert data_of(page)["towers"] == []
     assert "<dt>towers</dt><dd>0</dd>" in page
+
+
+def test_what_is_wrong_with_many_files_is_said_once_and_briefly(line, model):
+    with predict_survey(line, model, PredictSettings(), LONE_POLES) as prediction:
+        [file] = prediction.files
+        files = [
+            replace(file, name=f"{i}.laz", warnings=("all have it", f"only {i} has it"))
+            for i in range(30)
+        ]
+        page = survey_page(replace(prediction, files=tuple(files)), [])
+    assert page.count("all have it (0.laz and 29 more files)") == 1
+    assert page.count("has it (") == MOST_WARNINGS - 1
+    assert f"{31 - MOST_WARNINGS} more warnings" in page
 
 
 def test_only_its_own_script_and_style_may_run(page):

@@ -32,6 +32,9 @@ towers add is less than a hundredth of the points around them."""
 DECIMALS = {"m": 2, "1": 3, "": 0}
 """Decimals of the values of a column, by its unit."""
 
+MOST_WARNINGS = 10
+"""Most warnings on the page: a survey of hundreds of files may have as many."""
+
 LISTED = tuple(column for column in TOWER_COLUMNS if column.heading is not None)
 """The columns of the tower list that are for people."""
 
@@ -126,16 +129,21 @@ def _warnings(prediction: SurveyPrediction) -> str:
     for file in prediction.files:
         for text in file.warnings:
             found.setdefault(text, []).append(file.name)
-    warnings = [
-        f"{text} ({names[0]}" + (f" and {len(names) - 1} more files)" if names[1:] else ")")
-        if names
-        else text
-        for text, names in found.items()
-    ]
+    warnings = [text if not names else f"{text} ({_named(names)})" for text, names in found.items()]
     unused = sum(file.error is not None for file in prediction.files)
     if unused:
-        warnings.insert(0, f"{unused} files were not used. Nothing is known about their area.")
+        text = f"not used: {unused} of {len(prediction.files)} files; their towers are not known"
+        warnings.insert(0, text)
+    if len(warnings) > MOST_WARNINGS:
+        more = len(warnings) - MOST_WARNINGS
+        warnings[MOST_WARNINGS:] = [f"{more} more warnings, which are in the summary of the survey"]
     return _note("Warnings", warnings) if warnings else ""
+
+
+def _named(files: Sequence[str]) -> str:
+    """The first of some files, and how many there are besides."""
+    first, *others = files
+    return f"{first} and {len(others)} more file{'s' * (len(others) > 1)}" if others else first
 
 
 def _note(title: str, sentences: Iterable[str]) -> str:

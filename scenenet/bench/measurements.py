@@ -240,8 +240,9 @@ def survey() -> dict[str, Any]:
     reading and writing it."""
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.packaged import packaged_model
+    from scenenet.prediction.result_files import PredictionFiles
     from scenenet.prediction.settings import PredictSettings
-    from scenenet.prediction.writers import PredictionFiles, predict_to_files
+    from scenenet.prediction.writers import predict_to_files
     from scenenet.synthetic import SyntheticSettings, make_survey
 
     with scratch_folder() as scratch:

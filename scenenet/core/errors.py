@@ -7,8 +7,9 @@ import errno
 import os
 import shutil
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Self
 
 
 class InputError(ValueError):
@@ -38,6 +39,16 @@ class InputError(ValueError):
         self.remedy = remedy
         where = "".join(f"{part}: " for part in (self.file, place) if part)
         super().__init__(where + problem + (f". {remedy}" if remedy else ""))
+
+    def to_json(self) -> dict[str, str | None]:
+        """Its parts, for a file that a later stage reads."""
+        return {n: getattr(self, n) for n in ("problem", "file", "place", "remedy")}
+
+    @classmethod
+    def from_json(cls, parts: Mapping[str, str | None]) -> Self:
+        """The error with the parts that ``to_json`` gave."""
+        given = {name: parts[name] for name in ("file", "place", "remedy")}
+        return cls(parts["problem"] or "", **given)
 
     def __reduce__(self):  # keyword-only arguments do not survive the default pickling
         return _rebuild, (type(self), self.problem, self.file, self.place, self.remedy)

@@ -49,12 +49,22 @@ def track(items: Iterable[Item], label: str, total: int | None = None) -> Iterat
         yield from rich_track(items, description=label, total=total, console=console)
         return
     of_total = "" if total is None else f"/{total}"
-    last = time.monotonic()
+    start = last = time.monotonic()
     done = 0
     for done, item in enumerate(items, start=1):
         yield item
         now = time.monotonic()
         if now - last >= LOG_INTERVAL_S:
-            print(f"{label}: {done}{of_total}", file=sys.stderr, flush=True)
+            left = 0.0 if total is None else (now - start) / done * (total - done)
+            text = f", about {_duration(left)} left" if left > 0 else ""
+            print(f"{label}: {done}{of_total}{text}", file=sys.stderr, flush=True)
             last = now
     print(f"{label}: done ({done})", file=sys.stderr, flush=True)
+
+
+def _duration(seconds: float) -> str:
+    """A time in the unit in which it is a number of one or two digits."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{max(seconds, 1.0):.0f} s"

@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from scenenet.core.errors import InputError
 from scenenet.core.provenance import SAMPLE_SUFFIXES
@@ -25,13 +26,13 @@ class FileState:
 
     Attributes:
         path: the file or the folder.
-        identity: of each file, by name, that counts (``SAMPLE_SUFFIXES`` in a folder): device and
-            number of the file there, size, time of the last change (ns), and digest of its start
-            and end.
+        identity: of each file, by name, that counts (``SAMPLE_SUFFIXES`` in a folder): its number
+            on its disk, size, time of the last change (ns), and digest of its start and end. The
+            disk itself does not count: the nodes of a cluster number a shared one differently.
     """
 
     path: Path
-    identity: Mapping[str, tuple[int, int, int, int, str]]
+    identity: Mapping[str, tuple[int, int, int, str]]
 
     @classmethod
     def of(cls, path: str | Path) -> FileState:
@@ -45,6 +46,15 @@ class FileState:
         if path.is_dir():
             files = sorted(f for f in path.iterdir() if f.suffix.lower() in SAMPLE_SUFFIXES)
         return cls(path, {file.name: _identity(file) for file in files})
+
+    def to_json(self) -> dict[str, Any]:
+        return {"path": str(self.path), "identity": {n: list(i) for n, i in self.identity.items()}}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> FileState:
+        """The state that ``to_json`` gave."""
+        found = {n: (i[0], i[1], i[2], i[3]) for n, i in data["identity"].items()}
+        return cls(Path(data["path"]), found)
 
     def check(self) -> None:
         """Check that the file or folder has not changed since.
@@ -61,7 +71,7 @@ class FileState:
                 raise _changed(self.path / name if self.path.is_dir() else self.path)
 
 
-def _identity(path: Path) -> tuple[int, int, int, int, str]:
+def _identity(path: Path) -> tuple[int, int, int, str]:
     try:
         with path.open("rb") as stream:
             digest = hashlib.sha256(stream.read(ENDS_BYTES))
@@ -70,8 +80,7 @@ def _identity(path: Path) -> tuple[int, int, int, int, str]:
         status = path.stat()
     except OSError as error:
         raise InputError(f"cannot be read ({error.strerror})", file=path) from None
-    content = (status.st_size, status.st_mtime_ns, digest.hexdigest())
-    return (status.st_dev, status.st_ino, *content)
+    return status.st_ino, status.st_size, status.st_mtime_ns, digest.hexdigest()
 
 
 def _changed(path: str | Path) -> InputError:

@@ -2,7 +2,7 @@
 
 The CSV, GeoPackage and GeoJSON files, the tables of the report and the reference page all follow
 from the fields of ``SurveyTower``. A new column needs a new field here and the code that measures
-it (``scenenet.prediction.tile_predictions``).
+it (``scenenet.prediction.found_towers``).
 """
 
 from __future__ import annotations

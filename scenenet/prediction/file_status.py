@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,40 @@ class SurveyFile:
             "tower_points": self.tower_points,
             "error": "" if self.error is None else str(self.error),
         }
+
+    def to_record(self) -> dict[str, Any]:
+        """All of it as plain values, for a later stage."""
+        error = self.error
+        return {
+            "path": str(self.path),
+            "name": self.name,
+            "state": None if self.state is None else self.state.to_json(),
+            "n_points": self.n_points,
+            "extent": self.extent,
+            "towers": self.towers,
+            "tower_points": self.tower_points,
+            "warnings": self.warnings,
+            "error": None if error is None else error.to_json(),
+            "left_out": isinstance(error, LeftOut),
+        }
+
+    @classmethod
+    def from_record(cls, data: Mapping[str, Any]) -> SurveyFile:
+        """What ``to_record`` gave."""
+        error = None
+        if data["error"] is not None:
+            error = (LeftOut if data["left_out"] else InputError).from_json(data["error"])
+        return cls(
+            path=Path(data["path"]),
+            name=data["name"],
+            state=None if data["state"] is None else FileState.from_json(data["state"]),
+            n_points=data["n_points"],
+            extent=None if data["extent"] is None else tuple(data["extent"]),
+            towers=data["towers"],
+            tower_points=data["tower_points"],
+            warnings=tuple(data["warnings"]),
+            error=error,
+        )
 
 
 def readable(files: Iterable[SurveyFile]) -> Iterator[tuple[SurveyFile, FileState]]:

@@ -1,31 +1,47 @@
-"""Prediction of a whole survey: tiles with a halo, then towers, then the points."""
+"""Prediction of a whole survey: files are read, then predicted, then searched for towers.
+
+Each of these stages is a function of files, so that the workflow can run it as a job of its own:
+``read_file``, ``predict_file`` and ``find_in_survey``; ``write_points`` follows them.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from scenenet.core.errors import InputError, OutputError, in_file, warn
+from scenenet.core.errors import warn
+from scenenet.core.files import read_json, write_json
 from scenenet.core.outputs import check_space
-from scenenet.core.progress import track
+from scenenet.core.progress import quiet, track
 from scenenet.core.scratch import scratch_folder, temporary_directory
-from scenenet.core.unchanged import FileState, unchanged
+from scenenet.core.unchanged import FileState
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
-from scenenet.pointcloud import iter_chunks
-from scenenet.pointcloud.quality.screening import Screening
-from scenenet.pointcloud.reading import SurveyInfo
 from scenenet.prediction.file_status import SurveyFile, readable
+from scenenet.prediction.found_towers import FoundTowers, find_in_survey
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.survey_files import SurveyFiles, look_at, nothing_to_use
-from scenenet.prediction.tile_predictions import PointPredictions, TilePredictions
-from scenenet.prediction.tiling import TileSpool
+from scenenet.prediction.survey_files import SurveyFiles, look_at
+from scenenet.prediction.work.block_file import BlockFile
+from scenenet.prediction.work.point_predictions import PointLookUp, PointPredictions
+from scenenet.prediction.work.structures import Owners, Structures
+from scenenet.prediction.work.survey_system import SurveySystem
+from scenenet.prediction.work.survey_work import SurveyWork
+from scenenet.prediction.work.tile_predictions import TilePredictions
+from scenenet.prediction.work.tile_predictor import (
+    fullest_voxel,
+    observed_voxel_size,
+    predict_file,
+)
+from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.work_file import WorkFile, read_file
+from scenenet.prediction.work.work_folder import WorkFolder
 
 if TYPE_CHECKING:
     import pyproj
@@ -33,6 +49,8 @@ if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
     from scenenet.models.model_file import ModelCard
 
+
+Item = TypeVar("Item")
 
 SCRATCH_BYTES = 20
 """Bytes of temporary files for a point: 12 for its position, and up to 3.1 for the voxels, measured
@@ -48,11 +66,10 @@ class SurveyPrediction:
         files: its files, as they were read.
         model, card: the model and what its file says about it.
         settings, detection: the settings of the prediction.
-        crs: CRS of the survey; None where its files name none.
-        unit_sizes, unit_names: sizes in m of the units of its x, y and z, and their names.
-        n_tiles: tiles of voxels that hold a point.
-        voxel_size: m.
+        system: the coordinates of the survey.
+        spool: its voxels and points, by tiles of voxels.
         towers: the towers found, highest probability first, in the units of the survey.
+        structures: their shapes, m.
         tiles: the predictions on disk; they exist inside the ``with`` block of ``predict_survey``.
         started: ``time.perf_counter()`` at the start.
     """
@@ -63,14 +80,37 @@ class SurveyPrediction:
     card: ModelCard
     settings: PredictSettings
     detection: DetectionSettings
-    crs: pyproj.CRS | None
-    unit_sizes: tuple[float, float, float]
-    unit_names: tuple[str, str, str]
-    n_tiles: int
-    voxel_size: float
+    system: SurveySystem
+    spool: TileSpool
     towers: tuple[SurveyTower, ...]
+    structures: Structures
     tiles: TilePredictions
     started: float
+
+    @property
+    def crs(self) -> pyproj.CRS | None:
+        """CRS of the survey; None where its files name none."""
+        return self.system.crs
+
+    @property
+    def unit_sizes(self) -> tuple[float, float, float]:
+        """Sizes in m of the units of its x, y and z."""
+        return self.system.unit_sizes
+
+    @property
+    def unit_names(self) -> tuple[str, str, str]:
+        """Names of the units of its x, y and z."""
+        return self.system.unit_names
+
+    @property
+    def n_tiles(self) -> int:
+        """Tiles of voxels that hold a point."""
+        return len(self.spool)
+
+    @property
+    def voxel_size(self) -> float:
+        """m."""
+        return self.spool.voxel_size
 
     @property
     def n_points(self) -> int:
@@ -98,18 +138,22 @@ class SurveyPrediction:
         """Names of the GENEOs that the shares belong to; empty for a model without GENEOs."""
         return self.tiles.geneos
 
-    @property
-    def spool(self) -> TileSpool:
-        """Its voxels and points, by tiles of voxels."""
-        return self.tiles.spool
+    @cached_property
+    def points(self) -> PointLookUp:
+        """Says what was predicted for a point of the survey."""
+        return PointLookUp(self.tiles, self.structures, self.spool.lattice, self.unit_sizes)
+
+    @cached_property
+    def _owners(self) -> Owners:
+        return Owners(self.structures, self.spool.lattice)
 
     def owner(self, xyz: np.ndarray) -> np.ndarray:
         """(n,) uint32, id of the tower whose shape has each of the points (n, 3) m, 0 for none."""
-        return self.tiles.owner(xyz)
+        return self._owners(xyz)
 
     def look_up(self, xyz: np.ndarray) -> PointPredictions:
         """Probability, tower id and shares of points (n, 3) of the survey, in its units."""
-        return self.tiles.look_up(in_metres(xyz, self.unit_sizes))
+        return self.points(xyz)
 
 
 @contextmanager
@@ -118,6 +162,7 @@ def predict_survey(
     model: str | Path,
     settings: PredictSettings,
     detection: DetectionSettings,
+    work: WorkFolder | None = None,
 ) -> Iterator[SurveyPrediction]:
     """Predict every occupied voxel of a survey and find its towers.
 
@@ -134,12 +179,13 @@ def predict_survey(
         survey: LAS, LAZ, COPC or TS40K sample; a folder, a pattern or a tile index of LAS and LAZ
             files, of which one that cannot be used has its error in ``files``.
         model: model file with tau.
+        work: folder for the files between the stages, with those of an earlier call that was
+            stopped; None for a temporary one.
 
     Raises:
         InputError: the survey or the model cannot be used.
         OutputError: the disk of the temporary files has too little space.
     """
-    from scenenet.models.geneo_model import GeneoModel
     from scenenet.models.model_file import read_model
 
     started = time.perf_counter()
@@ -147,80 +193,78 @@ def predict_survey(
         survey = SurveyFiles.of(survey)
     trained, card = read_model(model)
     tau = card.threshold()  # fail before the work: without tau there is no tower
-    geneos = trained.names if isinstance(trained, GeneoModel) else []
-    voxel_size = trained.observed_size(settings.voxel_size or card.voxel_size)
-    with scratch_folder() as scratch:
-        spool = TileSpool(scratch, voxel_size)
-        files, info = read_files(survey, spool, settings.chunk_points)
-        tiles = TilePredictions(spool, scratch, geneos)
-        tiles.compute(trained, card, f"{survey.given.name}: tiles predicted")
-        found = tiles.find_towers(tau, detection)
+    voxel_size = observed_voxel_size(trained, card, settings)
+    headers, _ = look_at(survey)
+    size = SCRATCH_BYTES * sum(info.n_points for info in headers.values())
+    place = temporary_directory() if work is None else work.folder
+    check_space({place: size - (0 if work is None else work.bytes_kept())})
+    with nullcontext(work) if work is not None else _scratch() as folder:
+        _read_files(survey, folder, voxel_size, settings.chunk_points)
+        joined = SurveyWork.open(survey, folder.reads(survey))
+        tiles = _predict_files(joined, folder, trained, card)
+        if not folder.towers.exists():
+            found = find_in_survey(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
+            write_json(folder.towers, found.to_json())
+        found = FoundTowers.from_json(read_json(folder.towers))
         yield SurveyPrediction(
             survey=survey,
-            files=files,
+            files=joined.files,
             model=trained,
             card=card,
             settings=settings,
             detection=detection,
-            crs=info.crs,
-            unit_sizes=info.unit_sizes,
-            unit_names=info.unit_names,
-            n_tiles=len(spool),
-            voxel_size=voxel_size,
-            towers=tuple(tower.in_units(info.unit_sizes) for tower in found),
+            system=joined.system,
+            spool=joined.spool,
+            towers=found.towers,
+            structures=found.structures,
             tiles=tiles,
             started=started,
         )
 
 
-def read_files(
-    survey: SurveyFiles, spool: TileSpool, chunk_points: int
-) -> tuple[tuple[SurveyFile, ...], SurveyInfo]:
-    """Read all files of a survey into ``spool``.
-
-    The points of a damaged file before its damage stay in ``spool``, as surroundings of its
-    neighbours.
-
-    Returns:
-        the files, and the header of the first one that can be used; all have its CRS and units.
-
-    Raises:
-        InputError: no file can be used, or, of a survey that is one file, that one.
-    """
-    headers, errors = look_at(survey)
-    check_space({temporary_directory(): SCRATCH_BYTES * sum(i.n_points for i in headers.values())})
-    files, names = [], survey.names
-    for path in survey.files:
-        try:
-            if path in errors:
-                raise errors[path]
-            read = _read(path, headers[path], spool, chunk_points)
-            files.append(replace(read, name=names[path]))
-        except OutputError:
-            raise
-        except InputError as error:
-            if not survey.tiled:
-                raise
-            files.append(SurveyFile(path, names[path], error=error))
-    if not any(readable(files)):
-        raise nothing_to_use(survey, [file.error for file in files if file.error is not None])
-    return tuple(files), next(iter(headers.values()))
+@contextmanager
+def _scratch() -> Iterator[WorkFolder]:
+    with scratch_folder() as folder:
+        yield WorkFolder(folder)
 
 
-def _read(path: Path, info: SurveyInfo, spool: TileSpool, chunk_points: int) -> SurveyFile:
-    """Read a file into ``spool``, and look at it."""
-    screening, n_points, state = Screening(info, converted=True), 0, FileState.of(path)
-    with unchanged(state), in_file(path):
-        chunks = iter_chunks(path, chunk_points=chunk_points)
-        for chunk in track(chunks, f"{path.name}: chunks read"):
-            screening.add(chunk.xyz, chunk.classification)
-            spool.add(in_metres(chunk.xyz, info.unit_sizes))
-            n_points += len(chunk)
-    screening.raise_if_not_metres()
-    extent = (*screening.mins[:2].tolist(), *screening.maxs[:2].tolist()) if n_points else None
-    return SurveyFile(path, path.name, state, n_points, extent, warnings=screening.warnings())
+def _read_files(
+    survey: SurveyFiles, folder: WorkFolder, voxel_size: float, chunk_points: int
+) -> None:
+    """Read the files that are not in ``folder`` yet."""
+    names, reads = survey.names, folder.reads(survey)
+
+    def read(path: Path) -> None:
+        read_file(path, names[path], reads[path], voxel_size, chunk_points, survey.crs)
+
+    left = [path for path, out in reads.items() if not out.exists()]
+    _each(left, f"{survey.given.name}: files read", read)
 
 
-def in_metres(xyz: np.ndarray, unit_sizes: tuple[float, float, float]) -> np.ndarray:
-    """Coordinates (n, 3) in units of these sizes, as metres; metres stay the same to the bit."""
-    return xyz if unit_sizes == (1.0, 1.0, 1.0) else xyz * unit_sizes
+def _predict_files(
+    joined: SurveyWork, folder: WorkFolder, model: VoxelModel, card: ModelCard
+) -> TilePredictions:
+    """Predict the tiles of the files that are not in ``folder`` yet; each tile once."""
+    fullest = fullest_voxel(joined.spool, card)
+    files: list[BlockFile] = []
+    done: set[int] = set()
+
+    def predict(work: WorkFile) -> None:
+        out = folder.predicted(work.file.name)
+        if not out.exists():
+            predict_file(work, joined.spool, out, model, card, fullest, done=done)
+        files.append(BlockFile(out))
+        done.update(files[-1].codes("predictions"))
+
+    _each(joined.used, f"{joined.survey.given.name}: files predicted", predict)
+    return TilePredictions(files)
+
+
+def _each(items: Sequence[Item], label: str, step: Callable[[Item], None]) -> None:
+    """Take a step for each item and report progress: the step's own where there is one item."""
+    if len(items) == 1:
+        step(items[0])
+        return
+    for item in track(items, label):
+        with quiet():
+            step(item)

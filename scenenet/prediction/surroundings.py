@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenenet.prediction.tiling import EDGE, TileSpool
+from scenenet.prediction.work.tiling import EDGE, TileSpool
 
 KEPT_TILES = 64
 """Tiles of voxels kept in memory: successive look-ups mostly need the same ones."""

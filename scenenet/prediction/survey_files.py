@@ -7,13 +7,13 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from scenenet.core.errors import InputError
-from scenenet.pointcloud.las.crs import same_system
 from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
 from scenenet.prediction.file_status import LeftOut
 from scenenet.prediction.tile_index import INDEX_SUFFIXES, SUFFIXES, read_index
+from scenenet.prediction.work.survey_system import SurveySystem
 
 if TYPE_CHECKING:
     import pyproj
@@ -57,11 +57,11 @@ class SurveyFiles:
             files = (*index.files, *index.refused)
             return cls(given, given.stem, files, True, index.refused, index.notes, crs)
         if given.is_dir():
-            found = [path for path in given.iterdir() if path.suffix.lower() in SUFFIXES]
+            found = [path for path in given.iterdir() if _is_tile(path)]
             name = given.resolve().name
         elif not given.exists() and glob.has_magic(str(given)):
             matches = Path(given.anchor).glob(str(given.relative_to(given.anchor)))
-            found = [path for path in matches if path.suffix.lower() in SUFFIXES]
+            found = [path for path in matches if _is_tile(path)]
             name = next(p for p in given.parents if not glob.has_magic(str(p))).resolve().name
         else:
             return cls(given, result_stem(given), (given,), crs=crs)
@@ -89,6 +89,45 @@ class SurveyFiles:
             }
         return names
 
+    def to_json(self) -> dict[str, Any]:
+        """All of it as plain values, for a later stage."""
+        return {
+            "given": str(self.given),
+            "name": self.name,
+            "files": [str(path) for path in self.files],
+            "tiled": self.tiled,
+            "refused": {str(path): error.to_json() for path, error in self.refused.items()},
+            "notes": list(self.notes),
+            "crs": None if self.crs is None else self.crs.srs,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> SurveyFiles:
+        """The survey that ``to_json`` gave."""
+        import pyproj
+
+        return cls(
+            given=Path(data["given"]),
+            name=data["name"],
+            files=tuple(map(Path, data["files"])),
+            tiled=data["tiled"],
+            refused={Path(p): InputError.from_json(e) for p, e in data["refused"].items()},
+            notes=tuple(data["notes"]),
+            crs=None if data["crs"] is None else pyproj.CRS(data["crs"]),
+        )
+
+
+def _is_tile(path: Path) -> bool:
+    """Whether a file of a folder belongs to the survey. Hidden ones do not: copy programs write to
+    a hidden file until they have finished."""
+    return path.suffix.lower() in SUFFIXES and not path.name.startswith(".")
+
+
+def result_name(name: str) -> str:
+    """Name of the results of a file of a survey, from its name in the survey; it may have
+    folders."""
+    return Path(name).with_name(result_stem(Path(name))).as_posix()
+
 
 def result_stem(path: Path) -> str:
     """Name of the results of a file; ``.copc`` is not part of it."""
@@ -108,7 +147,9 @@ def look_at(survey: SurveyFiles) -> tuple[dict[Path, SurveyInfo], dict[Path, Inp
             continue
         try:
             info = survey_of_lengths(path, survey.crs)
-            _check_system(info, next(iter(headers.values()), info), path)
+            ours, theirs = (SurveySystem.of(i) for i in (next(iter(headers.values()), info), info))
+            if not theirs.is_same(ours):
+                raise in_other_system(path, theirs, ours)
             headers[path] = info
         except InputError as error:
             if not survey.tiled:
@@ -128,12 +169,10 @@ def nothing_to_use(survey: SurveyFiles, errors: Sequence[InputError]) -> InputEr
     )
 
 
-def _check_system(info: SurveyInfo, first: SurveyInfo, path: Path) -> None:
-    """Leave out a file in another CRS than the first one."""
-    if not same_system(info.crs, first.crs) or info.unit_sizes != first.unit_sizes:
-        ours, theirs = (i.crs.name if i.crs else "no CRS" for i in (first, info))
-        raise LeftOut(
-            f"the file has {theirs}, and the files before it have {ours}",
-            file=path,
-            remedy="Predict it by itself, or convert it first (pdal translate -f reprojection)",
-        )
+def in_other_system(path: Path, theirs: SurveySystem, ours: SurveySystem) -> LeftOut:
+    """The error of a file with other coordinates than those of the survey."""
+    return LeftOut(
+        f"the file has {theirs.name}, and the files before it have {ours.name}",
+        file=path,
+        remedy="Predict it by itself, or convert it first (pdal translate -f reprojection)",
+    )

@@ -16,7 +16,7 @@ from scenenet.core.files import write_json
 from scenenet.detection.survey_tower import SurveyTower, row_types
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.styles import STYLES
-from scenenet.prediction.tiling import TileSpool
+from scenenet.prediction.work.tiling import TileSpool
 
 if TYPE_CHECKING:
     import pyproj

@@ -283,7 +283,7 @@ def test_an_interrupted_prediction_leaves_nothing_behind(survey, model, tmp_path
     ) as process:
         os.close(writing)
         with os.fdopen(reading) as stderr:
-            wait_for(lambda: list(tmp_path.glob("scenenet-*/files/*.voxels")), process)
+            wait_for(lambda: list(tmp_path.glob("scenenet-*/files/.*/*.work")), process)
             process.send_signal(number)
             output = stderr.read()
     assert process.returncode == 128 + number

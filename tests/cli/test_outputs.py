@@ -14,7 +14,7 @@ import pytest
 from scenenet.core.errors import OutputError
 from scenenet.core.outputs import check_outputs
 from scenenet.pointcloud import survey_info
-from scenenet.prediction.writers import PredictionFiles
+from scenenet.prediction.result_files import PredictionFiles
 
 
 def test_another_survey_of_the_same_name_is_not_replaced(call, pole_survey, pole_model):

@@ -13,8 +13,9 @@ from fixtures import scenes
 from scenenet.detection.settings import DetectionSettings
 from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, write_las
+from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.writers import PredictionFiles, predict_to_files
+from scenenet.prediction.writers import predict_to_files
 
 
 @pytest.fixture(scope="package")

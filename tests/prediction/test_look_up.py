@@ -10,6 +10,8 @@ from scenenet.models.model_file import write_model
 from scenenet.pointcloud import read, write_las
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.work.point_predictions import PointLookUp
+from scenenet.prediction.work.structures import Structures
 
 POLE = (500_020.5, 4_630_031.5)
 POLE_CODE = 15
@@ -69,14 +71,11 @@ def test_no_points_have_no_predictions(opened):
 def test_points_in_the_shapes_of_two_towers_belong_to_the_first(opened):
     prediction, cloud = opened
     own = prediction.look_up(cloud.xyz).tower_id > 0
-    structures = prediction.tiles._structures
-    number, structure = structures[0]
+    [(number, structure)] = prediction.structures.numbered
     beside = structure.moved(-0.25, 0.0, 0.0)
-    structures.insert(0, (1, beside))
-    try:
-        numbers = prediction.look_up(cloud.xyz).tower_id[own]
-    finally:
-        structures.pop(0)
+    both = Structures(((1, beside), (number, structure)))
+    look_up = PointLookUp(prediction.tiles, both, prediction.spool.lattice, prediction.unit_sizes)
+    numbers = look_up(cloud.xyz).tower_id[own]
     in_first = beside.contains(cloud.xyz[own])
     assert 0 < in_first.sum() < own.sum()
     # The others are in the same voxels, and in the second shape.

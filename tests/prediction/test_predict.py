@@ -21,8 +21,9 @@ from scenenet.models.factory import new_model
 from scenenet.models.model_file import ModelCard, read_model, write_model
 from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
 from scenenet.pointcloud import PointCloud, read, write_las
+from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.writers import PredictionFiles, predict_to_files
+from scenenet.prediction.writers import predict_to_files
 from scenenet.training.train import fit
 from scenenet.training.tuning import choose
 
@@ -403,13 +404,13 @@ def test_a_survey_replaced_between_the_passes_leaves_the_earlier_result(
     first = predict(survey, model, tmp_path / "out")
     earlier = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
     assert first.summary["towers"] == 1
-    write = writers.write_points
+    write = writers.write_file
 
-    def replace_and_write(prediction, path, out):
+    def replace_and_write(file, prediction, out):
         other.replace(survey)
-        return write(prediction, path, out)
+        return write(file, prediction, out)
 
-    monkeypatch.setattr(writers, "write_points", replace_and_write)
+    monkeypatch.setattr(writers, "write_file", replace_and_write)
     with pytest.raises(InputError, match=r"survey\.las: the file was changed, replaced or removed"):
         predict(survey, model, tmp_path / "out")
     assert {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()} == earlier

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from fixtures.spools import spool_of
 
 from scenenet.prediction import surroundings
 from scenenet.prediction.surroundings import SurveySurroundings, occupied_voxels, survey_points
-from scenenet.prediction.tiling import TileSpool
+from scenenet.prediction.work.tiling import Lattice, TileSpool
 
 ORIGIN = np.array([544_000.0, 4_634_000.0, 80.0])
 
@@ -17,9 +18,7 @@ XYZ = np.random.default_rng(0).uniform(-150, 150, (4000, 3)) + ORIGIN
 
 @pytest.fixture(scope="module")
 def spool(tmp_path_factory) -> TileSpool:
-    spool = TileSpool(tmp_path_factory.mktemp("tiles"), 1.5)
-    spool.add(XYZ)
-    return spool
+    return spool_of(tmp_path_factory.mktemp("tiles") / "work", 1.5, [XYZ])
 
 
 @pytest.fixture(scope="module")
@@ -76,4 +75,4 @@ def test_large_tiles_do_not_all_stay_in_memory(spool, monkeypatch):
 
 
 def test_a_survey_without_points_has_none(tmp_path):
-    assert occupied_voxels(TileSpool(tmp_path, 1.0))(np.zeros(2), 100.0).shape == (0, 3)
+    assert occupied_voxels(TileSpool(Lattice(1.0), []))(np.zeros(2), 100.0).shape == (0, 3)

@@ -15,9 +15,10 @@ import pytest
 from scenenet.core.errors import InputError
 from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud import PointCloud, write_las
+from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles
-from scenenet.prediction.writers import PredictionFiles, predict_to_files
+from scenenet.prediction.writers import predict_to_files
 
 LONE_POLES = DetectionSettings(min_conductor=0)
 UTM = pyproj.CRS(32629)

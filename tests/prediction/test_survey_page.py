@@ -27,8 +27,9 @@ from scenenet.prediction.page.pictures import (
 )
 from scenenet.prediction.page.survey_page import LISTED, MOST_WARNINGS, not_seen, survey_page
 from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.writers import PredictionFiles, predict_to_files
+from scenenet.prediction.writers import predict_to_files
 
 LONE_POLES = DetectionSettings(min_conductor=0)
 

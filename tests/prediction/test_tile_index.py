@@ -14,10 +14,11 @@ import shapely
 from scenenet.core.errors import InputError
 from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud import PointCloud, write_las
+from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles
 from scenenet.prediction.tile_index import read_index
-from scenenet.prediction.writers import PredictionFiles, predict_to_files
+from scenenet.prediction.writers import predict_to_files
 
 
 def item(href: object, name: object = "tile", **more: object) -> dict:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import torch
+from fixtures.spools import spool_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -14,14 +13,14 @@ from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
 from scenenet.models.cnn import CNN
 from scenenet.models.scenenet import SceneNet
-from scenenet.prediction.tile_predictions import (
-    AT_ONCE,
-    MOST_AT_ONCE,
+from scenenet.prediction.work.block_file import BlockFile, BlockWriter
+from scenenet.prediction.work.tile_predictions import (
+    PREDICTED_KINDS,
     TilePrediction,
-    TilePredictor,
-    _together,
+    TilePredictions,
 )
-from scenenet.prediction.tiling import EDGE, Tile, TileSpool, code_of, groups
+from scenenet.prediction.work.tile_predictor import AT_ONCE, MOST_AT_ONCE, TilePredictor, _together
+from scenenet.prediction.work.tiling import EDGE, Lattice, Tile, TileSpool, code_of, groups
 
 ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])
 
@@ -33,10 +32,8 @@ def survey(seed: int = 0, n: int = 20_000, extent=(150.0, 90.0, 30.0)) -> np.nda
 
 
 def spooled(folder, xyz, voxel_size=1.0, chunk=None) -> TileSpool:
-    spool = TileSpool(folder, voxel_size)
-    for part in np.array_split(xyz, 1 if chunk is None else -(-len(xyz) // chunk)):
-        spool.add(part)
-    return spool
+    chunks = np.array_split(xyz, 1 if chunk is None else -(-len(xyz) // chunk))
+    return spool_of(folder / "work", voxel_size, chunks)
 
 
 def voxels_of(spool: TileSpool) -> dict[tuple[int, ...], int]:
@@ -72,9 +69,9 @@ def test_the_centre_of_a_voxel_lies_in_it(tmp_path):
     xyz = survey(n=500) + ORIGIN
     spool = spooled(tmp_path, xyz, 0.9)
     centres = np.concatenate([spool.centres(tile.zyx()) for tile in spool.tiles()])
-    code, voxel = spool.locate(centres)
+    code, voxel = spool.lattice.locate(centres)
     again = {(c, v) for c, v in zip(code.tolist(), voxel.tolist(), strict=True)}
-    assert again == set(zip(*(a.tolist() for a in spool.locate(xyz)), strict=True))
+    assert again == set(zip(*(a.tolist() for a in spool.lattice.locate(xyz)), strict=True))
     assert len(again) == len(centres)
 
 
@@ -113,7 +110,7 @@ def test_a_point_outside_the_lattice_is_named(tmp_path, stray):
     xyz = np.array([[0.0, 0, 0], stray])
     message = r"the point \[.*\] is too far from the origin.*Remove stray"
     with pytest.raises(InputError, match=message):
-        TileSpool(tmp_path, 1.0).add(xyz)
+        spooled(tmp_path, xyz)
 
 
 @given(
@@ -126,8 +123,8 @@ def test_the_offset_of_a_file_does_not_move_a_point_to_another_voxel(number, sca
     """A point on the lower border of a voxel belongs to it, however the file stores the place."""
     steps = number * round(size / scale)
     x = (steps - offset) * scale + offset * scale  # integer times scale plus offset, as in LAS
-    spool = TileSpool(Path(), size)
-    place, middle = (spool.locate(np.full((1, 3), at)) for at in (x, (number + 0.5) * size))
+    lattice = Lattice(size)
+    place, middle = (lattice.locate(np.full((1, 3), at)) for at in (x, (number + 0.5) * size))
     np.testing.assert_array_equal(np.concatenate(place), np.concatenate(middle))
 
 
@@ -200,10 +197,12 @@ def test_the_prediction_of_a_tile_is_read_back_as_it_was_saved(tmp_path, n_share
         voxel=np.arange(5, dtype=np.int32),
         probability=rng.random(5, np.float32),
         shares=rng.random((5, n_shares), np.float32),
-        tower=np.arange(5, dtype=np.uint32),
     )
-    saved.save(tmp_path / "tile")
-    back = TilePrediction.read(tmp_path / "tile", n_shares)
+    with (tmp_path / "tiles").open("wb") as stream:
+        blocks = BlockWriter(stream, PREDICTED_KINDS)
+        blocks.add("predictions", 7, saved.records())
+        blocks.end({"geneos": [str(number) for number in range(n_shares)]})
+    back = TilePredictions([BlockFile(tmp_path / "tiles")]).read(7)
     for name, expected in vars(saved).items():
         found = getattr(back, name)
         assert found.dtype == expected.dtype

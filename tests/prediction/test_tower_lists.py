@@ -18,8 +18,9 @@ from scenenet.core.files import sha256
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower, read_towers
 from scenenet.pointcloud import PointCloud, write_las
+from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.writers import PredictionFiles, predict_to_files
+from scenenet.prediction.writers import predict_to_files
 
 LONE_POLES = DetectionSettings(min_conductor=0)
 POLE, UNIT = (500_020.5, 4_630_031.5), 32629

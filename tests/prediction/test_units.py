@@ -15,8 +15,9 @@ import pytest
 from scenenet.detection.settings import DetectionSettings
 from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud import PointCloud, read, write_las
+from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.writers import PredictionFiles, predict_to_files
+from scenenet.prediction.writers import predict_to_files
 
 LONE_POLES = DetectionSettings(min_conductor=0)
 FOOT, SURVEY_FOOT = 0.3048, 1200 / 3937

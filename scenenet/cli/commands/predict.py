@@ -90,12 +90,14 @@ def command(
 
     The exit code is 1 if a survey fails; the other surveys are still predicted.
     """
+    from scenenet.core.code_hash import code_hash
     from scenenet.core.errors import InputError
     from scenenet.core.outputs import check_outputs
     from scenenet.pointcloud.copc import require_pdal
+    from scenenet.prediction import writers
+    from scenenet.prediction.result_files import PredictionFiles, require_space
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles, look_at
-    from scenenet.prediction.writers import PredictionFiles, predict_to_files, require_space
 
     settings = PredictSettings(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
@@ -114,13 +116,17 @@ def command(
         from scenenet.models.model_file import read_model
 
         read_model(model)[1].threshold()
-    points = [{path: i.n_points for path, i in headers.items()} for headers in seen.values()]
-    require_space(points, out, copc=copc)
+    points = {g: {path: i.n_points for path, i in headers.items()} for g, headers in seen.items()}
+    require_space([(files[given], counts) for given, counts in points.items()])
     detection = detection_settings(min_conductor)
+    tiled = any(named[given].tiled for given in seen)
+    code = code_hash([writers.__file__]) if tiled else None
     summaries = []
     for given in seen:
         with failures.collect():
-            summary = predict_to_files(named[given], model, files[given], settings, detection)
+            summary = writers.predict_to_files(
+                named[given], model, files[given], settings, detection, code
+            )
             summaries.append(summary.to_json())
             for file in summary.files:
                 if file["error"]:

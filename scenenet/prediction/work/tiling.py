@@ -6,15 +6,16 @@ coordinates. The prediction of a tile is therefore the same wherever a survey is
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.dataset.voxels import BORDER_M
+from scenenet.prediction.work.block_file import BlockFile, BlockWriter
 
 EDGE = 64
 """Voxels along the edge of a tile; a tile and its halo fit into a processor's cache."""
@@ -25,6 +26,10 @@ NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)))
 _BITS = 21
 _BIAS = 1 << (_BITS - 1)
 _SPOOLED = np.dtype([("voxel", "<i4"), ("count", "<i4")])
+_OFFSET = np.dtype("<f4")
+
+SPOOLED_KINDS = ("voxels", "points")
+"""Blocks of each tile: its occupied voxels, and its points."""
 
 
 @dataclass(frozen=True)
@@ -47,37 +52,15 @@ class Tile:
         return local + np.asarray(self.place, np.int64) * EDGE
 
 
-class TileSpool:
-    """The occupied voxels and the points of a survey, two files per tile."""
+@dataclass(frozen=True)
+class Lattice:
+    """The lattice of voxels that all surveys are on.
 
-    def __init__(self, folder: Path, voxel_size: float) -> None:
-        """Start an empty spool.
+    Attributes:
+        voxel_size: m.
+    """
 
-        Args:
-            folder: existing folder for the tiles.
-            voxel_size: m.
-        """
-        self.folder = folder
-        self.voxel_size = voxel_size
-        self._codes: set[int] = set()
-
-    def add(self, xyz: np.ndarray) -> None:
-        """Add points (n, 3) m to their tiles.
-
-        Raises:
-            InputError: a coordinate is outside the lattice.
-        """
-        codes, voxels = self.locate(xyz)
-        for code, rows in groups(codes):
-            voxel, count = np.unique(voxels[rows], return_counts=True)
-            records = np.empty(len(voxel), _SPOOLED)
-            records["voxel"], records["count"] = voxel, count
-            with self._path(code).open("ab") as stream:
-                stream.write(records.tobytes())
-            offset = xyz[rows] - self._corner(code)
-            with self._path(code, "points").open("ab") as stream:
-                stream.write(offset.astype(np.float32).tobytes())
-            self._codes.add(code)
+    voxel_size: float
 
     def locate(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tile code (n,) int64 and position in the tile (n,) int32 of points (n, 3) m.
@@ -99,34 +82,90 @@ class TileSpool:
         voxel = (local[:, 0] * EDGE + local[:, 1]) * EDGE + local[:, 2]
         return _encode(places), voxel.astype(np.int32)
 
+    def centres(self, zyx: np.ndarray) -> np.ndarray:
+        """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
+        return (zyx[:, ::-1] + 0.5) * self.voxel_size
+
+    def corner(self, code: int) -> np.ndarray:
+        """(3,) m, lowest x, y and z of a tile."""
+        return np.array(_decode(code)[::-1]) * (EDGE * self.voxel_size)
+
+    def columns(self, x: tuple[float, float], y: tuple[float, float]) -> set[tuple[int, int]]:
+        """(x, y) numbers of the columns of tiles that the rectangle of two ranges in m touches."""
+        edge = EDGE * self.voxel_size
+        (west, east), (south, north) = (
+            (int(np.floor((low - BORDER_M) / edge)), int(np.floor((high + 2 * BORDER_M) / edge)))
+            for low, high in (x, y)
+        )
+        return set(product(range(west, east + 1), range(south, north + 1)))
+
+
+class SpoolWriter:
+    """Writes the occupied voxels and the points of a file of a survey, tile by tile."""
+
+    def __init__(self, blocks: BlockWriter, lattice: Lattice) -> None:
+        """Add points to ``blocks``, which has the kinds of ``SPOOLED_KINDS``."""
+        self._blocks, self.lattice = blocks, lattice
+
+    def add(self, xyz: np.ndarray) -> None:
+        """Add points (n, 3) m to their tiles.
+
+        Raises:
+            InputError: a coordinate is outside the lattice.
+        """
+        codes, voxels = self.lattice.locate(xyz)
+        for code, rows in groups(codes):
+            voxel, count = np.unique(voxels[rows], return_counts=True)
+            records = np.empty(len(voxel), _SPOOLED)
+            records["voxel"], records["count"] = voxel, count
+            self._blocks.add("voxels", code, records)
+            offset = xyz[rows] - self.lattice.corner(code)
+            self._blocks.add("points", code, offset.astype(_OFFSET))
+
+
+class TileSpool:
+    """The occupied voxels and the points of a survey, in one file of blocks or in several."""
+
+    def __init__(self, lattice: Lattice, files: Iterable[BlockFile]) -> None:
+        """Look at the files.
+
+        Args:
+            files: written by ``SpoolWriter`` on the same lattice. Their order does not matter.
+        """
+        self.lattice = lattice
+        self._files: dict[int, list[BlockFile]] = defaultdict(list)
+        for file in files:
+            for code in file.codes("voxels"):
+                self._files[code].append(file)
+
+    @property
+    def voxel_size(self) -> float:
+        """m."""
+        return self.lattice.voxel_size
+
     def tiles(self) -> Iterator[Tile]:
         """Every tile that holds a point, in a fixed order."""
-        for code in sorted(self._codes):
+        for code in sorted(self._files):
             yield self.tile(code)
 
     def __len__(self) -> int:
-        return len(self._codes)
+        return len(self._files)
 
     def places(self) -> list[tuple[int, tuple[int, int, int]]]:
         """Code and place of every tile that holds a point, in a fixed order."""
-        return [(code, _decode(code)) for code in sorted(self._codes)]
+        return [(code, _decode(code)) for code in sorted(self._files)]
 
     def tile(self, code: int) -> Tile:
         """The tile with ``code``; a tile without voxels if it holds no point."""
-        place = _decode(code)
-        if code not in self._codes:
-            return Tile(place, np.empty(0, np.int32), np.empty(0, np.int32))
-        records = np.fromfile(self._path(code), _SPOOLED)
+        records = self._read("voxels", code, _SPOOLED)
         voxel, inverse = np.unique(records["voxel"], return_inverse=True)
         count = np.bincount(inverse, weights=records["count"])
-        return Tile(place, voxel, count.astype(np.int32))
+        return Tile(_decode(code), voxel, count.astype(np.int32))
 
     def points(self, code: int) -> np.ndarray:
         """(n, 3) m, points of the tile with ``code``, to a few micrometres, in a fixed order."""
-        if code not in self._codes:
-            return np.empty((0, 3))
-        offset = np.fromfile(self._path(code, "points"), np.float32).reshape(-1, 3)
-        return offset[np.lexsort(offset.T)] + self._corner(code)
+        offset = self._read("points", code, _OFFSET).reshape(-1, 3)
+        return offset[np.lexsort(offset.T)] + self.lattice.corner(code)
 
     def around(self, place: tuple[int, int, int], reach: tuple[int, int, int]) -> Tile:
         """A tile together with its neighbours up to ``reach`` (z, y, x) voxels away.
@@ -144,7 +183,7 @@ class TileSpool:
         shape = np.array([EDGE + 2 * r for r in reach])
         indices, counts = [], []
         for code in _encode(np.asarray(place) + NEIGHBOURS).tolist():
-            if code not in self._codes:
+            if code not in self._files:
                 continue
             tile = self.tile(code)
             zyx = tile.zyx() - low
@@ -158,19 +197,22 @@ class TileSpool:
 
     def centres(self, zyx: np.ndarray) -> np.ndarray:
         """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
-        return (zyx[:, ::-1] + 0.5) * self.voxel_size
+        return self.lattice.centres(zyx)
 
-    def _corner(self, code: int) -> np.ndarray:
-        """(3,) m, lowest x, y and z of a tile."""
-        return np.array(_decode(code)[::-1]) * (EDGE * self.voxel_size)
-
-    def _path(self, code: int, kind: str = "voxels") -> Path:
-        return self.folder / f"{code}.{kind}"
+    def _read(self, kind: str, code: int, dtype: np.dtype) -> np.ndarray:
+        parts = [file.read(kind, code, dtype) for file in self._files.get(code, ())]
+        return np.concatenate([np.empty(0, dtype), *parts])
 
 
 def code_of(place: tuple[int, int, int]) -> int:
     """The code of the tile at ``place`` (z, y, x)."""
     return int(_encode(np.asarray(place)[None])[0])
+
+
+def column_of(code: int) -> tuple[int, int]:
+    """(x, y) number of the column of tiles that has the tile with ``code``."""
+    _, y, x = _decode(code)
+    return x, y
 
 
 def groups(codes: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:

@@ -1,0 +1,1 @@
+"""What a prediction keeps on disk between its stages: voxels, points, predictions, shapes."""

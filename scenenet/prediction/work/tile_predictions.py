@@ -1,0 +1,105 @@
+"""The predictions of a model for the tiles of a survey, on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenenet.prediction.work.block_file import BlockFile
+from scenenet.prediction.work.tiling import TileSpool
+
+if TYPE_CHECKING:
+    from scenenet.models.base import VoxelModel
+
+PREDICTED_KINDS = ("predictions",)
+"""Blocks of each tile in a file of predictions."""
+
+
+@dataclass(frozen=True)
+class TilePrediction:
+    """The predictions for the occupied voxels of a tile.
+
+    Attributes:
+        voxel: (M,) int32 positions within the tile, ascending.
+        probability: (M,) float32.
+        shares: (M, K) float32, contribution of each GENEO to the observer, divided by the sum of
+            the absolute contributions. K is 0 for a model without GENEOs.
+    """
+
+    voxel: np.ndarray
+    probability: np.ndarray
+    shares: np.ndarray
+
+    def records(self) -> np.ndarray:
+        """(M,) records for a file of blocks."""
+        records = np.empty(len(self.voxel), _record(self.shares.shape[1]))
+        for name in records.dtype.names or ():
+            records[name] = getattr(self, name)
+        return records
+
+    @classmethod
+    def of(cls, records: np.ndarray) -> TilePrediction:
+        """What ``records`` gave."""
+        return cls(**{name: records[name].copy() for name in records.dtype.names or ()})
+
+
+def _record(n_shares: int) -> np.dtype:
+    """A voxel in a file of predictions."""
+    return np.dtype([("voxel", "<i4"), ("probability", "<f4"), ("shares", "<f4", (n_shares,))])
+
+
+class TilePredictions:
+    """The predictions for the tiles of a survey, or of a part of it.
+
+    Attributes:
+        geneos: names of the GENEOs of the model; empty for a model without any.
+    """
+
+    def __init__(self, files: Sequence[BlockFile]) -> None:
+        """Look at the files.
+
+        Args:
+            files: files of predictions by one model, at least one. Where two have the same tile,
+                they have the same values.
+        """
+        self.geneos = tuple(files[0].facts["geneos"])
+        self._files = {code: file for file in files for code in file.codes("predictions")}
+        self._cached = lru_cache(maxsize=64)(self.read)
+
+    def read(self, code: int) -> TilePrediction:
+        """The prediction of the tile with ``code``."""
+        return TilePrediction.of(
+            self._files[code].read("predictions", code, _record(len(self.geneos)))
+        )
+
+    def kept(self, code: int) -> TilePrediction:
+        """As ``read``; the tiles that were used last stay in memory."""
+        return self._cached(code)
+
+    def detected(
+        self, spool: TileSpool, threshold: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The voxels with probability >= ``threshold``: lattice positions (V, 3), probability (V,)
+        and shares (V, K), in a fixed order."""
+        zyx = [np.empty((0, 3), np.int64)]
+        probability = [np.empty(0, np.float32)]
+        shares = [np.empty((0, len(self.geneos)), np.float32)]
+        for code, _ in spool.places():
+            prediction = self.read(code)
+            found = prediction.probability >= threshold
+            if found.any():
+                zyx.append(spool.tile(code).zyx()[found])
+                probability.append(prediction.probability[found])
+                shares.append(prediction.shares[found])
+        return np.concatenate(zyx), np.concatenate(probability), np.concatenate(shares)
+
+
+def geneo_names(model: VoxelModel) -> tuple[str, ...]:
+    """Names of the GENEOs of a model; empty for a model without any."""
+    from scenenet.models.geneo_model import GeneoModel
+
+    return tuple(model.names) if isinstance(model, GeneoModel) else ()

@@ -1,0 +1,181 @@
+"""The model on the tiles of a survey: the work of the stage that predicts a file."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from scenenet.core.files import atomic
+from scenenet.core.progress import track
+from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.work.block_file import BlockWriter
+from scenenet.prediction.work.tile_predictions import PREDICTED_KINDS, TilePrediction, geneo_names
+from scenenet.prediction.work.tiling import EDGE, Tile, TileSpool, code_of
+from scenenet.prediction.work.work_file import WorkFile
+
+if TYPE_CHECKING:
+    import torch
+
+    from scenenet.dataset.voxels import Measurement
+    from scenenet.models.base import VoxelModel
+    from scenenet.models.model_file import ModelCard
+
+
+AT_ONCE, MOST_AT_ONCE = 4096, 64
+"""Tiles are predicted together until they have so many voxels, or there are so many of them: a
+survey with points far apart has a thousand tiles of a voxel each."""
+
+
+def predict_file(
+    own: WorkFile,
+    spool: TileSpool,
+    out: str | Path,
+    model: VoxelModel,
+    card: ModelCard,
+    fullest: int,
+    *,
+    done: Container[int] = (),
+) -> None:
+    """Predict the tiles in which a file has points, and write the predictions to a file of blocks.
+
+    A tile is predicted with all its voxels, also those of other files, so that it does not matter
+    which file it is predicted for.
+
+    Args:
+        own: the work file of the file.
+        spool: the voxels of the file and of all files near it.
+        out: file to write.
+        model, card: the model and what its file says about it.
+        fullest: points in the fullest voxel of the survey (``fullest_voxel``).
+        done: codes of tiles that need no prediction, because another file has it.
+
+    Raises:
+        OutputError: ``out`` cannot be written.
+    """
+    codes = sorted(code for code in own.blocks.codes("voxels") if code not in done)
+    tiles = (spool.tile(code) for code in codes)
+    predict = TilePredictor(model, card.measurement, spool.voxel_size, fullest)
+    with atomic(out) as partial, partial.open("wb") as stream:
+        blocks = BlockWriter(stream, PREDICTED_KINDS)
+        label = f"{own.file.path.name}: tiles predicted"
+        for together in _together(track(tiles, label, total=len(codes))):
+            predicted = predict(spool, together)
+            for tile, (probability, shares) in zip(together, predicted, strict=True):
+                prediction = TilePrediction(tile.voxel, probability, shares)
+                blocks.add("predictions", code_of(tile.place), prediction.records())
+        blocks.end({"geneos": geneo_names(model)})
+
+
+def observed_voxel_size(model: VoxelModel, card: ModelCard, settings: PredictSettings) -> float:
+    """m, edge of the voxels, or blocks of voxels, in which a model observes a survey."""
+    return model.observed_size(settings.voxel_size or card.voxel_size)
+
+
+def needed_around(model: VoxelModel, voxel_size: float) -> float:
+    """m around the points of a file within which all other files must be in the spool: a tile of
+    voxels reaches beyond the file, and its halo beyond the tile."""
+    return (EDGE + max(model.at(voxel_size).reach[1:])) * voxel_size
+
+
+def fullest_voxel(spool: TileSpool, card: ModelCard) -> int:
+    """Points in the fullest voxel of the survey, for a model that measures density; 1 for others.
+
+    There is one number for the whole survey: one for each tile would show as seams.
+    """
+    if card.measurement != "density":
+        return 1
+    return max((int(tile.count.max()) for tile in spool.tiles()), default=1)
+
+
+class TilePredictor:
+    """A model at the voxel size of a survey. Its kernels are sampled once, for all tiles."""
+
+    def __init__(
+        self, model: VoxelModel, measurement: Measurement, voxel_size: float, fullest: int
+    ) -> None:
+        """Sample the kernels.
+
+        Args:
+            measurement: of the model (``ModelCard``).
+            voxel_size: m.
+            fullest: points in the fullest voxel of the survey, for measurement ``density``.
+        """
+        import torch
+
+        from scenenet.models.geneo_model import GeneoModel
+
+        self.model = model.at(voxel_size)
+        self._fullest = fullest if measurement == "density" else None
+        self._bias: torch.Tensor | None = None
+        with torch.no_grad():
+            if isinstance(self.model, GeneoModel):
+                self._kernels = self.model.weighted_kernels()
+            else:
+                kernel, self._bias = self.model.observer()
+                self._kernels = kernel[None]
+
+    def __call__(
+        self, spool: TileSpool, tiles: Sequence[Tile]
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Probability (M,) and shares (M, K) at the occupied voxels of each tile.
+
+        The halo is as wide as the reach of the kernels, so that every voxel gets the value that it
+        would have without tiles.
+        """
+        import torch
+
+        from scenenet.convolution.occupancy import Occupancy
+        from scenenet.models.geneo_model import GeneoModel
+
+        reach = self.model.reach
+        shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
+        scenes = [spool.around(tile.place, reach) for tile in tiles]
+        phi = None
+        if self._fullest is not None:
+            phi = [(scene.count / self._fullest).astype(np.float32) for scene in scenes]
+        occupancy = Occupancy.of_grids([scene.voxel for scene in scenes], phi, shape)
+        inner = np.concatenate([
+            first + _inner(scene.voxel, shape, reach)
+            for first, scene in zip(occupancy.offsets[:-1], scenes, strict=True)
+        ])  # fmt: skip
+        with torch.no_grad():
+            # The shares are those of the voxel that the maximum of the cross-section is from.
+            parts = self.model.responses(occupancy, self._kernels)[:, torch.from_numpy(inner)]
+            if isinstance(self.model, GeneoModel):
+                observed = parts.sum(dim=0)
+                weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
+                shares = (parts / weight).T.contiguous().numpy()
+            else:
+                observed = parts[0]
+                observed = observed if self._bias is None else observed + self._bias
+                shares = np.empty((len(inner), 0), np.float32)
+            probability = torch.relu(torch.tanh(observed)).numpy()
+        ends = np.cumsum([len(tile.voxel) for tile in tiles])[:-1]
+        return list(zip(np.split(probability, ends), np.split(shares, ends), strict=True))
+
+
+def _together(tiles: Iterable[Tile]) -> Iterator[list[Tile]]:
+    """Groups of tiles that are predicted together."""
+    group: list[Tile] = []
+    for tile in tiles:
+        group.append(tile)
+        if len(group) == MOST_AT_ONCE or sum(len(one.voxel) for one in group) >= AT_ONCE:
+            yield group
+            group = []
+    if group:
+        yield group
+
+
+def _inner(
+    voxel: np.ndarray, shape: tuple[int, int, int], reach: tuple[int, int, int]
+) -> np.ndarray:
+    """Rows of ``voxel`` (M,), positions in a tile with its halo, that lie in the tile itself.
+
+    They come in the order of the tile's own voxels, as both are ascending.
+    """
+    zyx = np.unravel_index(voxel, shape)
+    inside = [(axis >= r) & (axis < r + EDGE) for axis, r in zip(zyx, reach, strict=True)]
+    return np.flatnonzero(inside[0] & inside[1] & inside[2])

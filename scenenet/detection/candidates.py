@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -29,8 +29,8 @@ class DetectedVoxels:
         self.centres, self.probability, self.voxel_size = centres, probability, voxel_size
         self.columns, column_of = np.unique(centres[:, :2], axis=0, return_inverse=True)
         column_of = column_of.reshape(-1)
-        order = np.argsort(column_of, kind="stable")
-        self._members = np.split(order, np.cumsum(np.bincount(column_of))[:-1])
+        self._by_column = np.argsort(column_of, kind="stable")
+        self._starts = np.append(0, np.cumsum(np.bincount(column_of)))
         self._tree = cKDTree(self.columns)
 
     def columns_within(self, place: np.ndarray, radius: float) -> list[int]:
@@ -39,8 +39,12 @@ class DetectedVoxels:
 
     def within(self, place: np.ndarray, radius: float) -> np.ndarray:
         """Voxels within a planar radius in m of a position (2,) m."""
-        columns = sorted(self.columns_within(place, radius))
-        return np.concatenate([self._members[c] for c in columns] or [np.empty(0, np.int64)])
+        return self._in_columns(self.columns_within(place, radius))
+
+    def _in_columns(self, columns: Sequence[int]) -> np.ndarray:
+        """Voxels in these columns, column by column."""
+        members = [self._by_column[self._starts[c] : self._starts[c + 1]] for c in sorted(columns)]
+        return np.concatenate([*members, np.empty(0, np.int64)])
 
     def mean(self, voxels: np.ndarray) -> np.ndarray:
         """(2,) m, mean position of voxels, weighted by their probabilities."""
@@ -53,7 +57,7 @@ class DetectedVoxels:
         adjacent = self._tree.query_ball_point(self.columns, 1.5 * self.voxel_size)
         levels, total = np.empty(len(self.columns)), np.empty(len(self.columns))
         for column, neighbours in enumerate(adjacent):
-            near = np.concatenate([self._members[c] for c in sorted(neighbours)])
+            near = self._in_columns(neighbours)
             levels[column] = len(set(level[near].tolist()))
             total[column] = self.probability[near].sum()
         return np.lexsort((self.columns[:, 1], self.columns[:, 0], -total, -levels))

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 
 import numpy as np
 
 from scenenet.detection.candidates import SURROUNDINGS_M
+from scenenet.detection.conductor_blocks import ConductorBlocks
 from scenenet.detection.conductor_rules import (
     ALONE_M,
     ATTACHED,
@@ -21,10 +21,7 @@ from scenenet.detection.conductor_rules import (
     FAR,
     GAP,
     HEAD,
-    HIGHEST_M,
     LEVEL_M,
-    LINE_CELL_M,
-    LINE_M,
     MAX_LEVELS,
     MIN_ALONE,
     MIN_ANGLE,
@@ -32,15 +29,8 @@ from scenenet.detection.conductor_rules import (
     NEAR,
     RISE,
     SECTOR,
-    TESTED_CELL_M,
 )
 from scenenet.detection.surroundings import Surroundings
-
-BLOCK_M, BLOCKS_KEPT = 32.0, 256
-"""m, edge of the blocks in which points on conductors are looked for, and number in memory."""
-
-GROUND = 5
-"""Percentile of the elevations in a block that counts as its ground."""
 
 
 @dataclass(frozen=True)
@@ -71,17 +61,20 @@ class Span:
 
 
 class ConductorPoints:
-    """The points of a survey that lie on conductors, looked for in a block when it is needed."""
+    """The points of a survey that lie on conductors, looked for where they are needed."""
 
     def __init__(self, points: Surroundings, lowest: float) -> None:
         """Nothing is looked for yet.
 
         Args:
-            points: gives the points around a position.
+            points: gives the points around a position. Threads may call it side by side.
             lowest: m above the ground; lower points are not on conductors.
         """
-        self._points, self._lowest = points, lowest
-        self._block = lru_cache(maxsize=BLOCKS_KEPT)(self._in_block)
+        self._blocks = ConductorBlocks(points, lowest)
+
+    def expect(self, axis: np.ndarray, crossarm: float) -> None:
+        """Begin to look, in another thread, for what ``leaving`` needs at an axis (2,) m."""
+        self._blocks.expect(axis, _reach(crossarm))
 
     def leaving(
         self, axis: np.ndarray, base: float, height: float, crossarm: float, around: Surroundings
@@ -96,7 +89,7 @@ class ConductorPoints:
                 have no conductor, and it is not looked up there.
         """
         foot = np.array([*axis, base])
-        places, directions, others = self._near(axis, float(np.hypot(FAR, crossarm)))
+        places, directions, others = self._blocks.near(axis, _reach(crossarm))
         offset = places - foot
         distance = np.hypot(offset[:, 0], offset[:, 1])
         here = (distance >= NEAR) & (offset[:, 2] >= HEAD * height)
@@ -114,48 +107,10 @@ class ConductorPoints:
             if _alone(span, others) >= MIN_ALONE and _levels(span) <= MAX_LEVELS
         ]
 
-    def _near(self, place: np.ndarray, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions (M, 3) m and directions (M, 3) of the points on conductors within a radius, and
-        positions (N, 3) m of other points."""
-        low, high = (np.floor((place + r) / BLOCK_M).astype(int) for r in (-radius, radius))
-        blocks = [
-            self._block(x, y)
-            for x in range(low[0], high[0] + 1)
-            for y in range(low[1], high[1] + 1)
-        ]
-        places, directions, others = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-        inside = np.hypot(*(places[:, :2] - place).T) <= radius
-        beside = np.hypot(*(others[:, :2] - place).T) <= radius
-        return places[inside], directions[inside], others[beside]
 
-    def _in_block(self, x: int, y: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """As ``_near``, within the block number ``x``, ``y``."""
-        from scenenet.detection.lines import points_on_lines  # compiled: half a second to import
-
-        middle = (np.array([x, y]) + 0.5) * BLOCK_M
-        near = self._points(middle, BLOCK_M / np.sqrt(2) + LINE_M)
-        if len(near) == 0:
-            return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3))
-        ground = np.percentile(near[:, 2], GROUND)
-        above = near[:, 2] - ground
-        near = near[(above >= self._lowest - RISE * LINE_M) & (above <= HIGHEST_M)]
-        near = near[_one_per_cell(near, LINE_CELL_M)]
-        tested = _one_per_cell(near, TESTED_CELL_M)
-        inside = np.abs(near[tested, :2] - middle).max(axis=1) <= BLOCK_M / 2
-        tested = tested[inside & (near[tested, 2] >= ground + self._lowest)]
-        rows, directions = points_on_lines(near, tested)
-        return near[rows], directions, near[np.setdiff1d(tested, rows)]
-
-
-def _one_per_cell(points: np.ndarray, size: float) -> np.ndarray:
-    """Rows (M,) of the first of the points (N, 3) m in each cell of ``size`` m."""
-    if len(points) == 0:
-        return np.empty(0, np.int64)
-    cells = np.floor(points / size).astype(np.int64)
-    cells -= cells.min(axis=0)
-    # One number for each cell: rows of numbers take ten times as long to sort.
-    number = np.ravel_multi_index(tuple(cells.T), tuple(cells.max(axis=0) + 1))
-    return np.sort(np.unique(number, return_index=True)[1])
+def _reach(crossarm: float) -> float:
+    """m, distance from an axis up to which conductors are looked for."""
+    return float(np.hypot(FAR, crossarm))
 
 
 def _alone(span: Span, others: np.ndarray) -> float:
@@ -167,6 +122,9 @@ def _alone(span: Span, others: np.ndarray) -> float:
     """
     from scipy.spatial import cKDTree
 
+    near = others >= span.places.min(axis=0) - ALONE_M
+    near &= others <= span.places.max(axis=0) + ALONE_M
+    others = others[near.all(axis=1)]
     if len(others) == 0:
         return 1.0
     beside = cKDTree(span.places).query(others, distance_upper_bound=ALONE_M)[0] <= ALONE_M
@@ -244,12 +202,16 @@ def _runs(bearing: np.ndarray, s: np.ndarray) -> Iterator[tuple[float, float, np
         bearing: (M,) degrees, of points on conductors.
         s: (M,) m, their distances along the conductors.
     """
+    middles = np.arange(0.0, 360.0, SECTOR / 3)
+    inside = _angle(bearing, middles[:, None]) <= SECTOR
+    metre = s.astype(np.int64)
     left = np.ones(len(bearing), bool)
     while left.any():
-        runs = []
-        for middle in np.arange(0.0, 360.0, SECTOR / 3):
-            inside = left & (_angle(bearing, middle) <= SECTOR)
-            runs.append((_longest_run(s[inside]), int(inside.sum()), -middle))
+        sectors, points = np.nonzero(inside & left)
+        seen = np.zeros((len(middles), metre.max() + 1), bool)
+        seen[sectors, metre[points]] = True
+        count = np.bincount(sectors, minlength=len(middles))
+        runs = zip(map(_longest_run, seen), count.tolist(), (-middles).tolist(), strict=True)
         length, _, negative = max(runs)
         if length < MIN_LENGTH:
             return
@@ -266,16 +228,16 @@ def _bearing(vectors: np.ndarray) -> np.ndarray:
     return np.degrees(np.arctan2(vectors[:, 0], vectors[:, 1])) % 360
 
 
-def _angle(bearing: np.ndarray, middle: float) -> np.ndarray:
-    """Degrees in [0, 180] between bearings (M,) and ``middle``."""
+def _angle(bearing: np.ndarray, middle: float | np.ndarray) -> np.ndarray:
+    """Degrees in [0, 180] between bearings and ``middle``."""
     return np.abs((bearing - middle + 180) % 360 - 180)
 
 
-def _longest_run(s: np.ndarray, gap: float = GAP) -> float:
-    """m, longest stretch of the positions (M,) m, none below 0, without a gap over ``gap`` m."""
-    if len(s) == 0:
+def _longest_run(seen: np.ndarray, gap: float = GAP) -> float:
+    """m, longest stretch of the metres (M,) bool that are seen, without a gap over ``gap`` m."""
+    metres = np.flatnonzero(seen)
+    if len(metres) == 0:
         return 0.0
-    metres = np.flatnonzero(np.bincount(s.astype(np.int64)))
     breaks = np.flatnonzero(np.diff(metres) > gap)
     first, last = metres[np.append(0, breaks + 1)], metres[np.append(breaks, -1)]
     return float((last - first).max() + 1)

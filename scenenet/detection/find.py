@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenenet.core.progress import track
 from scenenet.detection.candidates import SURROUNDINGS_M, DetectedVoxels
 from scenenet.detection.conductor_rules import FAR, FURTHEST_M, HEAD, WIDE, WIDEST_HEAD_M
 from scenenet.detection.conductors import ConductorPoints, Span
@@ -20,6 +21,9 @@ MIN_FREE = 1 / 3
 
 APART_M = 2.0
 """m, smallest distance between two towers, measured in points."""
+
+AHEAD = 6
+"""Number of rough towers ahead of the one that is measured at which conductors are looked for."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,7 @@ def find_towers(
     voxel_size: float,
     tau: float,
     settings: DetectionSettings,
+    progress: str | None = None,
 ) -> list[MeasuredTower]:
     """Find the towers among detected voxels and measure each in points, highest probability first.
 
@@ -96,70 +101,99 @@ def find_towers(
         points: gives the points around a position.
         voxel_size: m.
         tau: threshold of the model.
+        progress: label of the progress on stderr; None shows no progress.
     """
     if len(centres) == 0:
         return []
     offset = centres.min(axis=0)
     detected = DetectedVoxels(centres - offset, probability, voxel_size)
+    rough = rough_towers(detected, offset, surroundings, settings)
     conductors = ConductorPoints(points, HEAD * settings.min_height)
+    measurement = _Measurement(surroundings, points, conductors, offset, voxel_size, tau, settings)
     found: list[MeasuredTower] = []
-    for rough in rough_towers(detected, offset, surroundings, settings):
-        found += _in_points(
-            rough, surroundings, points, conductors, offset, voxel_size, tau, settings
-        )
+    places = range(len(rough)) if progress is None else track(range(len(rough)), progress)
+    for i in places:
+        for coming in rough[i : i + AHEAD]:
+            measurement.expect(coming)
+        found += measurement.towers_near(rough[i])
     towers = [tower.moved(offset) for tower in _distinct(found)]
     return sorted(towers, key=lambda tower: (-tower.probability, tower.x, tower.y))
 
 
-def _in_points(
-    rough: RoughTower,
-    surroundings: Surroundings,
-    points: Surroundings,
-    conductors: ConductorPoints,
-    offset: np.ndarray,
-    voxel_size: float,
-    tau: float,
-    settings: DetectionSettings,
-) -> list[MeasuredTower]:
-    """The towers that the points show near a rough one, relative to ``offset``.
+@dataclass(frozen=True)
+class _Measurement:
+    """Measures towers in points.
 
-    There may be two: one at the rough axis, and one amid the conductors, where the axis of a window
-    tower is.
+    Attributes:
+        surroundings: gives the occupied voxels around a position.
+        points: gives the points around a position.
+        conductors: those of the points that lie on conductors.
+        offset: (3,) m, that rough and measured towers are relative to.
+        voxel_size: m.
+        tau: threshold of the model.
+        settings: of the detection.
     """
-    axis = np.array([rough.x, rough.y])
-    sure = rough.probability >= tau
-    tests = BodyTests(settings.min_height, settings.min_upright, MIN_FREE)
-    needed = settings.min_conductor * (1 if sure else 2)
-    found: list[MeasuredTower] = []
 
-    def leaving(axis: np.ndarray, base: float, height: float, crossarm: float) -> list[Span]:
-        foot = base + offset[2]
-        spans = conductors.leaving(axis + offset[:2], foot, height, crossarm, surroundings)
-        return [replace(span, places=span.places - offset) for span in spans]
+    surroundings: Surroundings
+    points: Surroundings
+    conductors: ConductorPoints
+    offset: np.ndarray
+    voxel_size: float
+    tau: float
+    settings: DetectionSettings
 
-    # The cheapest test first: most trees have no conductor anywhere near.
-    wide = min(settings.crossarm * WIDE * rough.height, WIDEST_HEAD_M)
-    seen = leaving(axis, rough.base, rough.height, wide) if needed else []
-    if sum(span.followed for span in seen) < needed / 2:
-        return []
-    near = points(axis + offset[:2], SURROUNDINGS_M) - offset
-    for amid in (False, True):
-        share = settings.crossarm * (WIDE if amid else 1)
-        crossarm = min(max(settings.eps / 2, share * rough.height), WIDEST_HEAD_M)
-        shape = measure_structure(
-            near, leaving, axis, rough.base, rough.height, crossarm, tests, amid
-        )
-        if shape is None or not shape.carries(needed):
-            continue
-        place = np.array([shape.x, shape.y])
-        far = surroundings(place + offset[:2], FURTHEST_M + FAR) - offset
-        base = shape.ground.elevation
-        spans = tuple(s for s in shape.spans if leads_on(s, place, base, far, voxel_size))
-        if not replace(shape, spans=spans).carries(needed):
-            continue
-        if all(np.hypot(shape.x - other.x, shape.y - other.y) > APART_M for other in found):
-            found.append(MeasuredTower.of(rough, shape, spans))
-    return found
+    def expect(self, rough: RoughTower) -> None:
+        """Begin to look for the conductors at a rough tower."""
+        place = np.array([rough.x, rough.y]) + self.offset[:2]
+        self.conductors.expect(place, self._widest(rough))
+
+    def towers_near(self, rough: RoughTower) -> list[MeasuredTower]:
+        """The towers that the points show near a rough one.
+
+        There may be two: one at the rough axis, and one amid the conductors, where the axis of a
+        window tower is.
+        """
+        settings, offset = self.settings, self.offset
+        axis = np.array([rough.x, rough.y])
+        tests = BodyTests(settings.min_height, settings.min_upright, MIN_FREE)
+        needed = settings.min_conductor * (1 if rough.probability >= self.tau else 2)
+        found: list[MeasuredTower] = []
+
+        def leaving(axis: np.ndarray, base: float, height: float, crossarm: float) -> list[Span]:
+            place, foot = axis + offset[:2], base + offset[2]
+            spans = self.conductors.leaving(place, foot, height, crossarm, self.surroundings)
+            return [replace(span, places=span.places - offset) for span in spans]
+
+        # The cheapest test first: most trees have no conductor anywhere near.
+        widest = self._widest(rough)
+        seen = leaving(axis, rough.base, rough.height, widest) if needed else []
+        if sum(span.followed for span in seen) < needed / 2:
+            return []
+        near = self.points(axis + offset[:2], SURROUNDINGS_M) - offset
+        for amid in (False, True):
+            share = settings.crossarm * (WIDE if amid else 1)
+            crossarm = min(max(settings.eps / 2, share * rough.height), WIDEST_HEAD_M)
+            shape = measure_structure(
+                near, leaving, axis, rough.base, rough.height, crossarm, tests, amid
+            )
+            if shape is None or not shape.carries(needed):
+                continue
+            spans = self._leading_on(shape)
+            if not replace(shape, spans=spans).carries(needed):
+                continue
+            if all(np.hypot(shape.x - other.x, shape.y - other.y) > APART_M for other in found):
+                found.append(MeasuredTower.of(rough, shape, spans))
+        return found
+
+    def _widest(self, rough: RoughTower) -> float:
+        """m, largest distance at which a conductor passes the axis of a rough tower."""
+        return min(self.settings.crossarm * WIDE * rough.height, WIDEST_HEAD_M)
+
+    def _leading_on(self, shape: Structure) -> tuple[Span, ...]:
+        """The spans of a structure that lead to a support or to the edge of the data."""
+        place, base = np.array([shape.x, shape.y]), shape.ground.elevation
+        far = self.surroundings(place + self.offset[:2], FURTHEST_M + FAR) - self.offset
+        return tuple(s for s in shape.spans if leads_on(s, place, base, far, self.voxel_size))
 
 
 def _distinct(found: list[MeasuredTower]) -> list[MeasuredTower]:

@@ -47,22 +47,23 @@ class Ground:
     elevation: float
     slope: np.ndarray
 
-    def height(self, offset: np.ndarray) -> np.ndarray:
-        """(N,) m above the ground of points (N, 3): planar offset from the axis, elevation."""
-        return offset[:, 2] - self.elevation - offset[:, :2] @ self.slope
+    def height(self, east: np.ndarray, north: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """(N,) m above the ground: planar offsets from the axis and elevation, (N,) m each."""
+        return z - self.elevation - (east * self.slope[0] + north * self.slope[1])
 
 
-def fit_ground(offset: np.ndarray) -> Ground:
+def fit_ground(points: np.ndarray, axis: np.ndarray) -> Ground:
     """The ground around an axis.
 
     A plane through the lower points, by quantile regression, so that neither crowns nor single
     returns from below move it.
 
     Args:
-        offset: (N, 3) m, planar offset from the axis and elevation; at least one point.
+        points: (N, 3) m, at least one.
+        axis: (2,) m.
     """
-    near = offset[np.hypot(offset[:, 0], offset[:, 1]) <= RADIUS_M]
-    low = _lowest(near if len(near) else offset)
+    near = _within(points, axis)
+    low = _lowest(near)
     distance = np.hypot(low[:, 0], low[:, 1])
     design = np.column_stack([low[:, :2], np.ones(len(low))])
     middle = float(np.percentile(low[:, 2], 100 * QUANTILE))
@@ -86,12 +87,20 @@ def fit_ground(offset: np.ndarray) -> Ground:
     there = residual[(distance <= NEAR_M) & (np.abs(residual) < SPREAD_M)]
     if len(there) >= 4:
         plane[2] += np.percentile(there, 35)
-    every = near if len(near) else offset
-    above = every[:, 2] - middle - every[:, :2] @ plane[:2] - plane[2]
+    above = near[:, 2] - middle - near[:, :2] @ plane[:2] - plane[2]
     seen = (np.abs(z - design @ plane) < SEEN_M).mean()
     if seen < SEEN or (above < -BELOW_M).mean() > BELOW:
         plane[2] += np.percentile(above, 1)
     return Ground(middle + float(plane[2]), plane[:2])
+
+
+def _within(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Planar offset from the axis (2,) m and elevation of the points (N, 3) m within ``RADIUS_M``,
+    or of all if none is, (M, 3)."""
+    east, north = points[:, 0] - axis[0], points[:, 1] - axis[1]
+    near = np.flatnonzero((np.abs(east) <= RADIUS_M) & (np.abs(north) <= RADIUS_M))
+    near = near[np.hypot(east[near], north[near]) <= RADIUS_M]
+    return (points.T[:, near].T if len(near) else points) - [*axis, 0.0]
 
 
 def _lowest(offset: np.ndarray) -> np.ndarray:

@@ -85,6 +85,12 @@ def slim(height: float) -> float:
     return max(SLIM_M, SLIM * height)
 
 
+def furthest(height: float) -> float:
+    """m, largest distance along or across the line from an approximate axis to a point that may
+    matter: no prism that is tried, with the air around it, reaches further."""
+    return SHIFT_M + 3 * slim(height) + 1
+
+
 def fit_profile(s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float) -> Profile | None:
     """The body near an approximate axis, or None where nothing stands free.
 
@@ -92,10 +98,8 @@ def fit_profile(s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float) -> P
         s, t, h: (N,) m.
         height: m, approximate height of the tower.
     """
-    # No prism that is tried, with the air around it, reaches further.
-    furthest = SHIFT_M + 3 * slim(height) + 1
     inside = (h >= SCRUB_M) & (h <= height)
-    inside &= np.maximum(np.abs(s), np.abs(t)) <= furthest
+    inside &= np.maximum(np.abs(s), np.abs(t)) <= furthest(height)
     s, t, h = s[inside], t[inside], h[inside]
     best: tuple[float, float, np.ndarray, float] | None = None
     for level in LEVELS_M:

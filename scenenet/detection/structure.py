@@ -25,7 +25,7 @@ from scenenet.detection.conductors import Span
 from scenenet.detection.ground import Ground, fit_ground
 from scenenet.detection.head import ARM_M, NO_HEAD, Head, find_head
 from scenenet.detection.portal import find_twin
-from scenenet.detection.profile import GAP_M, Profile, fit_profile
+from scenenet.detection.profile import GAP_M, SCRUB_M, Profile, fit_profile, furthest
 
 MARGIN_M = 0.1
 """m around members: noise of ranging and of the axis."""
@@ -217,14 +217,17 @@ def _measure_body(
     points: np.ndarray, axis: np.ndarray, along: np.ndarray, height: float
 ) -> Structure | None:
     """The body near an axis, without crossarms and conductors."""
-    s, t, h = _frame(points, axis, along, fit_ground(points - [*axis, 0]))
+    points = _around(points, axis, np.sqrt(2) * furthest(height))
+    if len(points) == 0:
+        return None
+    s, t, h = _frame(points, axis, along, fit_ground(points, axis))
     profile = fit_profile(s, t, h, height)
     if profile is None:
         return None
     axis = axis + profile.s * along + profile.t * _across(along)
     profile = replace(profile, s=0.0, t=0.0)
-    ground = fit_ground(points - [*axis, 0])
-    s, t, h = _frame(points, axis, along, ground)
+    ground = fit_ground(points, axis)
+    s, t, h = _frame(points, axis, along, ground, FOOT_M)
     half = profile.half_width(h) + MARGIN_M
     inside = np.maximum(np.abs(s), np.abs(t)) <= half
     foot = _foot(s, t, h, profile, height)
@@ -239,13 +242,13 @@ def _measure_body(
 def _with_twin(body: Structure, points: np.ndarray) -> Structure:
     """The body, or both bodies of a portal."""
     axis = np.array([body.x, body.y])
-    s, t, h = _frame(points, axis, body.along, body.ground)
+    s, t, h = _frame(points, axis, body.along, body.ground, SCRUB_M)
     at = find_twin(s, t, h, body.profile, body.height)
     if at is None:
         return body
     away = at / 2 * _across(body.along)
     x, y = (axis + away).tolist()
-    ground = fit_ground(points - [x, y, 0])
+    ground = fit_ground(points, np.array([x, y]))
     top = body.height + body.ground.elevation + float(body.ground.slope @ away)
     return replace(body, x=x, y=y, ground=ground, apart=abs(at) / 2, height=top - ground.elevation)
 
@@ -258,7 +261,6 @@ def _with_head(
     Args:
         origin: (2,) m, the axis that the spans are relative to.
     """
-    s, t, h = _frame(points, np.array([body.x, body.y]), body.along, body.ground)
     across = _across(body.along)
     moved = float((origin - np.array([body.x, body.y])) @ across)
     body = replace(body, spans=spans)
@@ -274,6 +276,7 @@ def _with_head(
     lowest = max(lowest, body.height / 2)
     highest = max(body.height, *(span.highest for span in line))
     reach = max(abs(side) for side in sides)
+    s, t, h = _frame(points, np.array([body.x, body.y]), body.along, body.ground, lowest)
     head = find_head(s, t, h, body.profile, body.apart, lowest, highest, reach)
     shape = replace(body, head=head, height=highest + PEAK_M)
     top = max(body.height, float(h[shape.in_arm(s, t, h)].max(initial=0.0)))
@@ -297,14 +300,28 @@ def _foot(s: np.ndarray, t: np.ndarray, h: np.ndarray, profile: Profile, height:
     return foot
 
 
+def _around(points: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
+    """The points (N, 3) m in a square of twice ``radius`` m about an axis (2,) m, (M, 3)."""
+    near = np.abs(points[:, 0] - axis[0]) <= radius
+    near &= np.abs(points[:, 1] - axis[1]) <= radius
+    return points.T[:, np.flatnonzero(near)].T
+
+
 def _frame(
-    xyz: np.ndarray, axis: np.ndarray, along: np.ndarray, ground: Ground
+    xyz: np.ndarray,
+    axis: np.ndarray,
+    along: np.ndarray,
+    ground: Ground,
+    lowest: float | None = None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """s along the line, t to its right, h above the ground, each (N,) m."""
-    offset = xyz - np.array([*axis, 0.0])
-    s = offset[:, :2] @ along
-    t = offset[:, 0] * along[1] - offset[:, 1] * along[0]
-    return s, t, ground.height(offset)
+    """s along the line, t to its right, h above the ground, each (N,) m; of the points that are at
+    least ``lowest`` m above it, if that is given."""
+    east, north = xyz[:, 0] - axis[0], xyz[:, 1] - axis[1]
+    h = ground.height(east, north, xyz[:, 2])
+    if lowest is not None:
+        rows = np.flatnonzero(h >= lowest)
+        east, north, h = east[rows], north[rows], h[rows]
+    return east * along[0] + north * along[1], east * along[1] - north * along[0], h
 
 
 def _along(spans: tuple[Span, ...]) -> np.ndarray:

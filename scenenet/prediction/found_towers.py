@@ -48,6 +48,7 @@ def find_in_survey(
     unit_sizes: tuple[float, float, float],
     tau: float,
     settings: DetectionSettings,
+    progress: str | None = None,
 ) -> FoundTowers:
     """Find the towers of a survey.
 
@@ -56,12 +57,12 @@ def find_in_survey(
         predictions: for all its tiles.
         unit_sizes: sizes in m of the units of its x, y and z.
         tau: of the model.
+        progress: label of the progress on stderr; None shows no progress.
     """
     zyx, probability, shares = predictions.detected(spool, settings.threshold(tau))
     occupied, points = occupied_voxels(spool), survey_points(spool)
-    found = find_towers(
-        spool.centres(zyx), probability, occupied, points, spool.voxel_size, tau, settings
-    )
+    centres, size = spool.centres(zyx), spool.voxel_size
+    found = find_towers(centres, probability, occupied, points, size, tau, settings, progress)
     numbers = tower_ids(np.array([(tower.x, tower.y) for tower in found]).reshape(-1, 2))
     shapes = (tower.structure for tower in found)
     structures = Structures(tuple(zip(numbers, shapes, strict=True)))

@@ -203,7 +203,9 @@ def predict_survey(
         joined = SurveyWork.open(survey, folder.reads(survey))
         tiles = _predict_files(joined, folder, trained, card)
         if not folder.towers.exists():
-            found = find_in_survey(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
+            label = f"{survey.given.name}: candidates measured"
+            sizes = joined.system.unit_sizes
+            found = find_in_survey(joined.spool, tiles, sizes, tau, detection, label)
             write_json(folder.towers, found.to_json())
         found = FoundTowers.from_json(read_json(folder.towers))
         yield SurveyPrediction(

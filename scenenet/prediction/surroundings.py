@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
+from threading import Lock
 
 import numpy as np
 
@@ -29,31 +30,35 @@ class _Positions:
     """The positions in a tile.
 
     Attributes:
-        xyz: (n, 3) m.
-        x, y: (n,) m, copies of two columns, which are much faster to read alone.
+        columns: (3, n) m: x, y and z, each of which is faster to read alone.
     """
 
-    xyz: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
+    columns: np.ndarray
 
     @classmethod
     def of(cls, xyz: np.ndarray) -> _Positions:
-        return cls(xyz, xyz[:, 0].copy(), xyz[:, 1].copy())
+        return cls(np.ascontiguousarray(xyz.T))
+
+    def __len__(self) -> int:
+        return self.columns.shape[1]
 
     def around(self, place: np.ndarray, radius: float) -> np.ndarray:
-        """(m, 3) m, those within a planar radius of a place (2,), in the order of ``xyz``."""
-        east, north = self.x - place[0], self.y - place[1]
-        squared = east * east + north * north
-        inside = squared <= max(radius - ROUNDING_M, 0.0) ** 2
+        """(3, m) m, those within a planar radius of a place (2,), in their order."""
+        east, north = self.columns[:2] - place[:, None]
+        squared = east * east
+        squared += north * north
+        inside = squared <= (radius + ROUNDING_M) ** 2
+        rows = np.flatnonzero(inside)
         # Squares are rounded, so the distance itself decides at the border.
-        border = np.flatnonzero(~inside & (squared <= (radius + ROUNDING_M) ** 2))
-        inside[border] = np.hypot(east[border], north[border]) <= radius
-        return self.xyz[inside]
+        border = rows[squared[rows] > max(radius - ROUNDING_M, 0.0) ** 2]
+        if len(border):
+            inside[border] = np.hypot(east[border], north[border]) <= radius
+            rows = np.flatnonzero(inside)
+        return self.columns[:, rows]
 
 
 class SurveySurroundings:
-    """What is near a place; each tile is read when a look-up needs it."""
+    """What is near a place; each tile is read when a look-up needs it. Threads may share it."""
 
     def __init__(self, spool: TileSpool, read: Callable[[int], np.ndarray], kept: int) -> None:
         """Start with no tile in memory.
@@ -68,28 +73,31 @@ class SurveySurroundings:
             self._above[x, y].append(code)
         self._read, self._kept = read, kept
         self._tiles: OrderedDict[int, _Positions] = OrderedDict()
+        self._lock = Lock()
 
     def __call__(self, place: np.ndarray, radius: float) -> np.ndarray:
-        """(M, 3) m, the positions within a planar radius in m of a place (2,)."""
+        """(M, 3) m, the positions within a planar radius in m of a place (2,). Each of the three
+        columns is contiguous."""
         low, high = (np.floor((place + r) / self._edge).astype(int) for r in (-radius, radius))
-        near = [np.empty((0, 3))]
+        near = [np.empty((3, 0))]
         for x in range(low[0], high[0] + 1):
             for y in range(low[1], high[1] + 1):
                 for code in self._above.get((x, y), ()):
                     near.append(self._tile(code).around(place, radius))
-        return np.concatenate(near)
+        return np.concatenate(near, axis=1).T
 
     def _tile(self, code: int) -> _Positions:
         """The positions in a tile. Those that were used last stay in memory."""
-        if code not in self._tiles:
-            self._tiles[code] = _Positions.of(self._read(code))
-            while (
-                len(self._tiles) > self._kept
-                and sum(len(tile.xyz) for tile in self._tiles.values()) > KEPT_IN_ALL
-            ):
-                self._tiles.popitem(last=False)
-        self._tiles.move_to_end(code)
-        return self._tiles[code]
+        with self._lock:
+            if code not in self._tiles:
+                self._tiles[code] = _Positions.of(self._read(code))
+                while (
+                    len(self._tiles) > self._kept
+                    and sum(len(tile) for tile in self._tiles.values()) > KEPT_IN_ALL
+                ):
+                    self._tiles.popitem(last=False)
+            self._tiles.move_to_end(code)
+            return self._tiles[code]
 
 
 def occupied_voxels(spool: TileSpool) -> SurveySurroundings:

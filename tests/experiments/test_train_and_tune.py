@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from scenenet.baselines import boosted_trees
-from scenenet.baselines.boosted_trees import BoostedTreesSettings
 from scenenet.core.errors import InputError
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.experiments.train_and_tune import train_and_tune
@@ -69,9 +68,8 @@ def test_without_validation_tau_is_of_the_training_crops(crops):
     assert thesis.tau == thesis.curve(crops[:3]).best()[0]
 
 
-def test_boosted_trees_are_never_tuned_on_their_training_crops(crops):
-    settings = BoostedTreesSettings()
-    tuned, curve = boosted_trees.fit_and_tune(crops[:3], settings, 2)
+def test_boosted_trees_are_never_tuned_on_their_training_crops(crops, few_trees):
+    tuned, curve = boosted_trees.fit_and_tune(crops[:3], few_trees, 2)
     tuned_model = train_and_tune(None, crops[:3], [], 2)
     assert (tuned_model.tau, tuned_model.f05) == (tuned.threshold(), curve.best()[1].f05)
     with_validation = train_and_tune(None, crops[:3], crops[3:4], 2)

@@ -21,7 +21,7 @@ from scenenet.tracking.registry import register_champions
 from scenenet.tracking.run_log import RunGroup, RunRecord, log_runs
 from scenenet.tracking.store import STORE_TAG, TrackingSettings, create_store, request_for, store_id
 
-KILLS = 10
+KILLS = 4
 CREATE = (
     "from scenenet.tracking.database import create_database, exclusive\n"
     "with exclusive('sqlite:///mlflow.db'): create_database('sqlite:///mlflow.db')"

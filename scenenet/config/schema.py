@@ -135,6 +135,12 @@ class Config(Settings):
     study_job: int = Field(
         60, ge=1, description="trainings of a study that one job runs, or one seed of all variants"
     )
+    study_crops: int | None = Field(
+        None,
+        ge=1,
+        description="most training crops of a training in a study, evenly from those of the split, "
+        "so that the studies of a large dataset take less time; null for all of them",
+    )
     studies: tuple[StudySettings, ...] = Field(
         (),
         description="series of short trainings that differ in one setting; see config/studies.yaml",

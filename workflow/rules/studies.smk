@@ -26,6 +26,7 @@ rule study:
             model=model_settings(settings.study_named(STUDY_JOBS[w.study_job][0]).model),
             voxels=SETTINGS["voxels"],
             split=SETTINGS["split"],
+            crops=settings.study_crops,
         ),
     message:
         "Running trainings of the study {wildcards.study_job}"

@@ -18,6 +18,7 @@ def study(job: _job.Job) -> None:
         SplitSettings(**job.identity["split"]),
         job.output.runs,
         job.output.times,
+        job.identity["crops"],
     )
 
 

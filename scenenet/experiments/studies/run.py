@@ -47,6 +47,7 @@ def run_study(
     split: SplitSettings,
     out: str | Path,
     out_times: str | Path,
+    crops: int | None = None,
 ) -> pd.DataFrame:
     """Train and score every variant from every seed, and write a row for each.
 
@@ -61,6 +62,7 @@ def run_study(
         out: CSV file, columns ``COLUMNS``; ``lowest_weight`` and ``lowest_shape`` are the lowest
             mixing weight and shape parameter of a SCENE-Net after training.
         out_times: CSV file, columns variant, seed, training_seconds (s) and inference_ms.
+        crops: most training crops of a training, evenly from those of the split; None for all.
 
     Returns:
         the table of scores.
@@ -76,7 +78,7 @@ def run_study(
         parts = data.parts(plan.split)
         key = (plan.model.model_dump_json(), plan.voxels, plan.split, seed)
         if key not in trained:
-            training = data.samples(plan.voxels, parts["train"])
+            training = data.samples(plan.voxels, _evenly(parts["train"], crops))
             trained[key] = _trained(training, plan.model, seed)
         result, facts = trained[key]
         validation = data.samples(plan.applied_voxels, parts["validation"])
@@ -115,6 +117,13 @@ class _Crops:
             cloud = self._clouds[crop]
             self._samples[grid, crop] = voxelise(cloud, grid.grid(cloud.xyz), crop)
         return self._samples[grid, crop]
+
+
+def _evenly(ids: Sequence[str], most: int | None) -> Sequence[str]:
+    """At most ``most`` of ``ids``, as far apart as can be; all of them for None."""
+    if most is None or len(ids) <= most:
+        return ids
+    return [ids[i * len(ids) // most] for i in range(most)]
 
 
 def _trained(

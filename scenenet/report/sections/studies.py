@@ -28,7 +28,7 @@ def studies(context: ReportContext) -> Section | None:
             *with_published(VOXEL_SCORES),
             Column("parameters", "parameters", "count"),
             *(NEGATIVE if frame["negative_share"].max() > 0 else ()),
-            Column("training_crops", "crops", "count"),
+            Column("training_crops", "training crops", "count"),
         ]
         caption = (
             f"Scores on the {study.part} crops, mean ± standard deviation over "

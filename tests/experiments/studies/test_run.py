@@ -220,6 +220,25 @@ def test_initial_models_are_scored_without_training(crops, tmp_path):
     assert one != other
 
 
+def test_a_study_may_train_on_a_part_of_the_crops(crops, tmp_path, monkeypatch):
+    trained_on = []
+    fit = run.fit
+
+    def recorded(training, *arguments):
+        trained_on.append([sample.id for sample in training])
+        return fit(training, *arguments)
+
+    monkeypatch.setattr(run, "fit", recorded)
+    defined = study(seeds=(0,), variants=[{"name": "short", "changes": {"training.epochs": 1}}])
+    split = SPLIT.model_copy(update={"train": 0.6, "test": 0.2})
+    for most in (None, 9, 2):
+        table = run_study(crops, defined, MODEL, GRID, split, *files(tmp_path), most)
+        assert list(table["training_crops"]) == [len(trained_on[-1])]
+    every, nine, part = trained_on
+    assert nine == every and len(every) > 2
+    assert part == [every[0], every[len(every) // 2]]
+
+
 def test_a_diverged_training_counts_as_dead_and_the_others_continue(crops, tmp_path):
     lost = {"training.learning_rate": 1e30, "training.optimiser": "sgd", "training.epochs": 4}
     defined = study(variants=[{"name": "lost", "changes": lost}, {"name": "kept"}])

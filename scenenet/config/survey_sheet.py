@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import glob
 import os
 import re
 import sys
@@ -17,12 +18,13 @@ from pydantic import Field
 from scenenet.core.errors import InputError
 from scenenet.core.settings import NAME, Settings, path_fault
 from scenenet.pointcloud.class_schemes import SCHEMES, Codes
+from scenenet.prediction.tile_index import INDEX_SUFFIXES
 
 if TYPE_CHECKING:
     from scenenet.config.schema import Config
 
 Role = Literal["train", "new"]
-Origin = Literal["file", "synthetic", "ts40k"]
+Origin = Literal["file", "tiles", "synthetic", "ts40k"]
 
 
 LAS_SUFFIXES = (".las", ".laz")
@@ -48,8 +50,10 @@ class SurveyRow(Settings):
     )
     path: str = Field(
         min_length=1,
-        description="LAS, LAZ, COPC, .npy or .pt file, or a folder of TS40K samples; relative to "
-        f"the root of the project, or absolute; {RESULTS}/synthetic/NAME.laz is a synthetic survey",
+        description="LAS, LAZ, COPC, .npy or .pt file; for train also a folder of TS40K samples; "
+        "for new also a folder, a pattern or a tile index of LAS and LAZ files, which are one "
+        "survey; relative to the root of the project, or absolute; "
+        f"{RESULTS}/synthetic/NAME.laz is a synthetic survey",
     )
     codes: Codes = Field(description="class scheme of the labels")
     role: Role = Field(description="train: part of the dataset; new: only classified")
@@ -73,8 +77,8 @@ class Survey:
         path: relative to the root of the project, or absolute.
         codes: class scheme of its labels.
         role: train or new.
-        origin: ``file`` for a recorded survey, ``synthetic`` for one that the workflow makes,
-            ``ts40k`` for a folder of samples.
+        origin: ``file`` for a recorded survey, ``tiles`` for one of many files, ``synthetic`` for
+            one that the workflow makes, ``ts40k`` for a folder of samples.
         crs: the coordinate system if the file states none, as text; None if it is not known.
     """
 
@@ -227,7 +231,7 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
     }
     synthetic = path in made
     problems += [] if synthetic else _path_problems(path, row["path"], role, root, config)
-    origin: Origin = "synthetic" if synthetic else "file"
+    origin: Origin = "synthetic" if synthetic else "tiles" if _is_tiled(root / path) else "file"
     # An unknown code or role is among the problems, and then the survey is not used.
     crs = row.get("crs") or None
     return Survey(name, path, cast(Codes, codes), cast(Role, role), origin, crs), problems
@@ -259,11 +263,13 @@ def _path_problems(path: str, written: str, role: str, root: Path, config: Confi
     where = root / path
     if fault := _unreachable(where):
         return [f"{path} cannot be read: {fault}"]
+    if _is_tiled(where):
+        return _tile_problems(path, where, role)
     if where.is_dir():
         if any(file.suffix in (".npy", ".pt") for file in where.iterdir()):
             can_only = f"{path} is a folder; samples in a folder can only be trained on"
             return [can_only] if role == "new" else []
-        return [f"{path} is a folder without TS40K samples; LAS and LAZ files get a row each"]
+        return [f"{path} is a folder without LAS and LAZ files, and without TS40K samples"]
     if where.is_file():
         if where.suffix.lower() in SURVEY_SUFFIXES:
             return []
@@ -279,6 +285,31 @@ def _path_problems(path: str, written: str, role: str, root: Path, config: Confi
     close = difflib.get_close_matches(where.name, names, n=1)
     hint = f", did you mean {Path(path).with_name(close[0])}?" if close else ""
     return [f"{path} is not there{hint}"]
+
+
+def _is_tiled(where: Path) -> bool:
+    """Whether a path is a survey of many files: a folder, a pattern or a tile index."""
+    if where.is_dir():
+        files = [file.suffix.lower() for file in where.iterdir()]
+        return not {".npy", ".pt"} & set(files) and bool({*LAS_SUFFIXES} & set(files))
+    if not os.path.lexists(where):
+        return glob.has_magic(str(where))
+    return where.is_file() and where.suffix.lower() in INDEX_SUFFIXES
+
+
+def _tile_problems(path: str, where: Path, role: str) -> list[str]:
+    if role == "train":
+        return [
+            f"{path} is a survey of many LAS and LAZ files, which can only be classified (role "
+            "new); to train on them, give each file a row"
+        ]
+    from scenenet.prediction.survey_files import SurveyFiles
+
+    try:
+        SurveyFiles.of(where)
+    except InputError as error:
+        return [f"{path}: {error.problem}"]
+    return []
 
 
 def _unreachable(where: Path) -> str | None:
@@ -309,8 +340,8 @@ def _ts40k(config: Config, root: Path) -> Iterator[Survey]:
 def _inbox(
     config: Config, root: Path, known: list[Survey], warn: Callable[[str], None]
 ) -> Iterator[Survey]:
-    """LAS and LAZ files of the inbox that the sheet does not name. Hidden files are skipped: copy
-    programs write to a hidden file until they have finished."""
+    """LAS and LAZ files of the inbox, and folders of them, that the sheet does not name. Hidden
+    ones are skipped: copy programs write to a hidden file until they have finished."""
     if config.new_surveys.folder is None or not (root / config.new_surveys.folder).is_dir():
         return
     listed = {os.path.realpath(root / survey.path) for survey in known}
@@ -318,7 +349,7 @@ def _inbox(
         file
         for file in sorted((root / config.new_surveys.folder).iterdir())
         if not file.name.startswith(".")
-        and file.suffix.lower() in LAS_SUFFIXES
+        and (_is_tiled(file) if file.is_dir() else file.suffix.lower() in LAS_SUFFIXES)
         and os.path.realpath(file) not in listed
     ]
     owners: dict[str, list[str]] = {survey.name: [survey.path] for survey in known}
@@ -328,13 +359,14 @@ def _inbox(
         path, name = str(Path(config.new_surveys.folder) / file.name), _inbox_name(file)
         reason = _why_left_out(file, path, name, owners[name])
         if reason is None:
-            yield Survey(name, path, config.new_surveys.codes, "new")
+            origin: Origin = "tiles" if file.is_dir() else "file"
+            yield Survey(name, path, config.new_surveys.codes, "new", origin)
         else:
             warn(f"left out: {path}: {reason}")
 
 
 def _inbox_name(file: Path) -> str:
-    return file_name(file.stem.removesuffix(".copc"))
+    return file_name(file.name if file.is_dir() else file.stem.removesuffix(".copc"))
 
 
 def _why_left_out(file: Path, path: str, name: str, owners: list[str]) -> str | None:

@@ -6,7 +6,7 @@
 - ``annotation_noise``: labels as annotators assign them.
 - ``codes``: the class codes.
 - ``corridor``: a whole corridor, stretch by stretch.
-- ``survey``: the files of a survey.
+- ``survey``: the files of a survey; ``survey_tiles``: cut into tiles.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from __future__ import annotations
 from scenenet.synthetic.corridor import Corridor, Stretch, TrueTower, corridor_cloud, make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.synthetic.survey import is_synthetic_survey, make_survey, towers_geojson
+from scenenet.synthetic.survey_tiles import tile_names
 
 __all__ = [
     "Corridor",
@@ -24,5 +25,6 @@ __all__ = [
     "is_synthetic_survey",
     "make_corridor",
     "make_survey",
+    "tile_names",
     "towers_geojson",
 ]

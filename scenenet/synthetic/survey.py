@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from scenenet.pointcloud.las.writing import las_stream
 from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.corridor import Corridor, TrueTower, make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
+from scenenet.synthetic.survey_tiles import Write, tiled_stream
 
 GENERATOR = "scenenet synth"
 """The generating software in the header of a synthetic survey."""
@@ -33,16 +35,19 @@ def make_survey(
     towers: str | Path | None = None,
     progress: str | None = None,
     workers: int | None = None,
+    tiles: int | None = None,
 ) -> dict[str, Any]:
     """Generate a corridor and write it as a survey, stretch by stretch.
 
     Args:
         settings: of the survey.
-        out: LAS or LAZ file with the labels as annotated, ``edp`` codes.
+        out: LAS or LAZ file with the labels as annotated, ``edp`` codes; with ``tiles`` a folder.
         truth: the same points in the same order with the labels before annotation noise.
         towers: GeoJSON, a point per true tower: id, x, y, base, height, type.
         progress: label of the progress on stderr; None shows no progress.
         workers: threads; None for one per core. Their number does not change the files.
+        tiles: number of files that the survey is cut into, across the line; ``out`` and ``truth``
+            are then folders for them. None for one file.
 
     Returns:
         Counts: points, towers, length_m, classes (code -> points), and mislabelled: the share of
@@ -55,6 +60,13 @@ def make_survey(
     corridor = make_corridor(settings)
     surveys = [Path(path) for path in (out, truth) if path is not None]
     check_space({path: space_needed(corridor, path) for path in surveys})
+
+    def one(path: Path) -> AbstractContextManager[Write]:
+        return las_stream(path, corridor.crs, offsets, software=GENERATOR)
+
+    def survey(path: Path) -> AbstractContextManager[Write]:
+        return one(path) if tiles is None else tiled_stream(path, corridor, tiles, one)
+
     stretches = corridor.stretches(workers or len(os.sched_getaffinity(0)))
     if progress is not None:
         stretches = track(stretches, progress, total=len(corridor))
@@ -63,10 +75,8 @@ def make_survey(
     # The line starts at the origin; a file with steps of 1 mm reaches 2000 km to each side of it.
     offsets = np.floor([settings.easting / 1000, settings.northing / 1000, 0.0]) * 1000
     with contextlib.ExitStack() as files:
-        annotated = files.enter_context(las_stream(out, corridor.crs, offsets, software=GENERATOR))
-        true = None
-        if truth is not None:
-            true = files.enter_context(las_stream(truth, corridor.crs, offsets, software=GENERATOR))
+        annotated = files.enter_context(survey(Path(out)))
+        true = None if truth is None else files.enter_context(survey(Path(truth)))
         for stretch in stretches:
             annotated(stretch.xyz, stretch.labels)
             if true is not None:
@@ -88,7 +98,8 @@ def make_survey(
 def space_needed(corridor: Corridor, path: Path) -> int:
     """About how many bytes the survey of a corridor takes in the file ``path``."""
     pulses = corridor.length * 2 * corridor.settings.half_width * corridor.settings.density
-    return int(pulses * POINTS_PER_PULSE * POINT_BYTES.get(path.suffix.lower(), 0))
+    point = POINT_BYTES.get(path.suffix.lower() or ".laz", 0)
+    return int(pulses * POINTS_PER_PULSE * point)
 
 
 def is_synthetic_survey(path: Path) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import get_args
 
 import pytest
@@ -20,6 +21,8 @@ def root(tmp_path):
     for path in ("data/north.laz", "data/south.las", "ts40k/a.npy", "inbox/new one.laz"):
         (tmp_path / path).parent.mkdir(exist_ok=True)
         (tmp_path / path).write_bytes(path.encode())
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "bad.vpc").write_text("{}")
     return tmp_path
 
 
@@ -45,6 +48,25 @@ def complaint(root, *rows: str, **more) -> str:
 def test_a_row_is_a_survey(root):
     assert read(root, "north\tdata/north.laz\tedp\ttrain") == [
         Survey("north", "data/north.laz", "edp", "train", "file")
+    ]
+
+
+def test_a_folder_a_pattern_and_an_index_are_one_survey_each(root):
+    items = [{"assets": {"data": {"href": "data/north.laz"}}}]
+    (root / "index.vpc").write_text(json.dumps({"features": items}))
+    rows = [f"s{number}\t{path}\tedp\tnew"
+            for number, path in enumerate(("data", "data/n*.laz", "index.vpc"))]  # fmt: skip
+    assert [survey.origin for survey in read(root, *rows)] == ["tiles"] * 3
+
+
+def test_a_folder_of_tiles_in_the_inbox_is_one_survey(root):
+    (root / "inbox" / "line 7.2").mkdir()
+    (root / "inbox" / "line 7.2" / "a.laz").write_bytes(b"")
+    (root / "inbox" / "notes").mkdir()
+    found = read(root, new_surveys={"folder": "inbox", "codes": "asprs"})
+    assert found == [
+        Survey("line_7.2", "inbox/line 7.2", "asprs", "new", "tiles"),
+        Survey("new_one", "inbox/new one.laz", "asprs", "new", "file"),
     ]
 
 
@@ -104,7 +126,16 @@ def test_an_absolute_path_is_not_changed(root):
         ("\tdata/north.laz\tedp\ttrain", "survey is empty"),
         ("north\tdata/north.laz\tedp", "role is empty"),
         ("north\tdata/north.laz\tedp\ttrain\tnote", "5 columns, where the first line names 4"),
-        ("north\tdata\tedp\ttrain", "a folder without TS40K samples"),
+        (
+            "north\tdata\tedp\ttrain",
+            "data is a survey of many LAS and LAZ files, which can",
+        ),
+        (
+            "north\tempty\tedp\tnew",
+            "empty is a folder without LAS and LAZ files, and",
+        ),
+        ("north\tdata/*.xyz\tedp\tnew", "data/*.xyz: there is no LAS or LAZ file in it"),
+        ("north\tbad.vpc\tedp\tnew", "bad.vpc: this is not a tile index: no item in it has assets"),
         ("north\tsurveys.tsv\tedp\ttrain", "surveys.tsv is none of .las, .laz, .npy, .pt"),
         ("north\tts40k\tedp\tnew", "is a folder; samples in a folder can only be trained on"),
         ("x\t{results_dir}/synthetic/mode.laz\tedp\ttrain", "{results_dir}/synthetic/made.laz?"),
@@ -193,8 +224,8 @@ def test_every_survey_in_the_inbox_is_new(root):
 
 
 def test_the_inbox_skips_other_files_and_incomplete_copies(root):
-    for name in ("notes.txt", ".half.laz", "sub/deep.laz"):
-        (root / "inbox" / name).parent.mkdir(exist_ok=True)
+    for name in ("notes.txt", ".half.laz", "sub/further/deep.laz"):
+        (root / "inbox" / name).parent.mkdir(exist_ok=True, parents=True)
         (root / "inbox" / name).write_bytes(b"")
     (root / "inbox" / "tile.copc.laz").write_bytes(b"")
     names = [survey.name for survey in read(root, new_surveys={"folder": "inbox"})]

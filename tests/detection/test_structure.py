@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from scenenet.detection.conductors import ConductorPoints
 from scenenet.detection.structure import BodyTests, measure_structure
+from scenenet.detection.structure_record import from_record, to_record
 from scenenet.detection.surroundings import surroundings_in
 
 ANY = BodyTests(9.0, 0.75, 1 / 3)
@@ -44,6 +47,18 @@ def test_its_own_points_are_found_and_few_others(tower_scene, kind, height):
     assert np.hypot(shape.x - scene.foot[0], shape.y - scene.foot[1]) < 0.3
     assert shape.height == pytest.approx(height, abs=0.4)
     assert shape.ground.elevation == pytest.approx(scene.foot[2], abs=0.3)
+
+
+@pytest.mark.parametrize(
+    ("kind", "height"), [("tubular", 18.0), ("h_frame", 18.0), ("lattice", 40)]
+)
+def test_its_record_says_the_same_of_every_point(tower_scene, kind, height):
+    scene = tower_scene(kind, height)
+    shape = measured(scene, height + 2)
+    again = from_record(json.loads(json.dumps(to_record(shape))))
+    np.testing.assert_array_equal(again.contains(scene.xyz), shape.contains(scene.xyz))
+    assert again.reach == shape.reach
+    assert to_record(again) == to_record(shape)
 
 
 @pytest.mark.parametrize("bearing", [0, 17, 45, 90, 133])

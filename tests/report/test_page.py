@@ -216,6 +216,19 @@ def test_a_survey_without_towers_says_so(page: Path, results: Results, thesis: T
     assert "No tower was found in fresh." in read(page).text
 
 
+def test_files_that_were_not_predicted_are_named_with_the_reason(
+    page: Path, results: Results, thesis: Thesis
+):
+    file = results.folder / "predict" / "fresh" / "fresh.summary.json"
+    row = {"file": "a.laz", "status": "predicted", "points": 5, "error": ""}
+    bad = {**row, "file": "b.laz", "status": "failed", "error": "b.laz: it is a web page"}
+    write_json(file, {**read_json(file), "files": [row, bad]})
+    write_report(results, thesis, page)
+    text = read(page).text
+    assert "1 of 2 files of fresh were not predicted." in text
+    assert "b.laz: it is a web page" in text
+
+
 def test_a_broken_picture_is_named(page: Path, results: Results, thesis: Thesis):
     (results.folder / "figures" / "training-scenenet.png").write_text("not a picture")
     with pytest.raises(InputError, match=r"training-scenenet\.png: is not a PNG"):

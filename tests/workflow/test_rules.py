@@ -21,7 +21,7 @@ def rules(root) -> dict[str, dict[str, list[str]]]:
     for file in sorted((root / "workflow" / "rules").glob("*.smk")):
         rule = None
         for number, line in enumerate(file.read_text().splitlines(), 1):
-            if start := re.match(r"( *)rule ?(\w*):$", line):
+            if start := re.match(r"( *)(?:rule|checkpoint) ?(\w*):$", line):
                 indent = f"{start[1]}    "
                 rule = found[start[2] or f"{file.name}:{number}"] = {}
             elif re.match(r"\S", line):

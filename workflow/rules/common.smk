@@ -21,6 +21,7 @@ from scenenet.core.files import digest
 from scenenet.core.provenance import fingerprint
 from scenenet.results.tables import print_scores
 from scenenet.config.survey_sheet import read_surveys
+from scenenet.config.tile_plan import NEIGHBOURS_M, HeaderCache, plan_tiles
 
 WORKFLOW = Path(workflow.current_basedir).parent
 PROJECT = WORKFLOW.parent
@@ -163,6 +164,19 @@ def champion_file(model):
     return f"{R}/models/{model}{suffix_of(model)}"
 
 
+def plans_of_tiles():
+    """The tiles of each survey that has several files. Their headers are looked at once."""
+    cache = HeaderCache(".snakemake/scenenet-tiles.json")
+    found = {
+        name: plan_tiles(survey, settings.content_below * 1024**2, cache)
+        for name, survey in SURVEYS.items()
+        if survey.origin == "tiles"
+    }
+    if workflow.is_main_process:
+        cache.save()
+    return found
+
+
 MODEL_SUFFIXES = {"scenenet": ".json", "cnn": ".safetensors"}
 # The name of a model has no dot, so this folder is never that of a model.
 BOOSTED_TREES = "boosted.trees"
@@ -172,6 +186,7 @@ try:
     settings = load(with_defaults(config))
     SURVEYS = {survey.name: survey for survey in read_surveys(settings, warn=warn_once)}
     THESIS = {"thesis": fingerprint(own_file(settings.thesis))}
+    PLANS = plans_of_tiles()
 except InputError as error:
     raise WorkflowError(str(error)) from None
 
@@ -181,6 +196,9 @@ GRID = settings.voxels.label
 # Sorted, so that the order of the rows in the survey sheet does not matter.
 TRAIN = sorted(filter(trained_on, SURVEYS))
 NEW = sorted(set(SURVEYS) - set(TRAIN))
+# New surveys of many files, and of one. Tile by tile there is neither a check nor a picture.
+TILED = sorted(PLANS)
+WHOLE = [survey for survey in NEW if survey not in PLANS]
 EXPERIMENTS = settings.experiments()
 CROSS_VALIDATED = {
     **{model.name: model.model_dump(mode="json") for model in settings.crossed_models()},
@@ -226,6 +244,7 @@ wildcard_constraints:
     synthetic=any_of(survey.name for survey in settings.synthetic.surveys),
     survey=any_of(VALUES["survey"]),
     model=any_of(VALUES["model"]),
+    tile=r"[^/].*",
     study=any_of(VALUES["study"]),
     study_job=any_of(VALUES["study_job"]),
     experiment=any_of(VALUES["experiment"]),

@@ -136,7 +136,7 @@ rule prediction_map:
     benchmark:
         f"{R}/benchmarks/prediction_map/{{survey}}.tsv"
     wildcard_constraints:
-        survey=any_of(NEW),
+        survey=any_of(WHOLE),
     conda:
         "../envs/scenenet.yaml"
     threads: 1

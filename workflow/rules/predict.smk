@@ -1,4 +1,4 @@
-"""Predictions: new surveys classified, with a list of their towers."""
+"""Predictions of surveys of one file: classified, with a list of their towers."""
 
 
 rule predict:
@@ -30,7 +30,7 @@ rule predict:
     benchmark:
         f"{R}/benchmarks/predict/{{survey}}.tsv"
     wildcard_constraints:
-        survey=any_of(NEW),
+        survey=any_of(WHOLE),
     conda:
         "../envs/scenenet.yaml"
     threads: 2

@@ -43,9 +43,9 @@ rule report:
         models=every("tune", "model"),
         certificates=every("certificate", "certificate"),
         checks=every("check", "report"),
-        towers=every("predict", "geojson"),
-        summaries=every("predict", "summary"),
-        pages=every("predict", "page"),
+        towers=every_prediction("geojson"),
+        summaries=every_prediction("summary"),
+        pages=every_prediction("page"),
         records=every_record(),
         thesis=ancient(own_file(settings.thesis)),
     output:

@@ -41,6 +41,8 @@ rule check:
         f"{R}/logs/check/{{survey}}.log",
     benchmark:
         f"{R}/benchmarks/check/{{survey}}.tsv"
+    wildcard_constraints:
+        survey=any_of([*TRAIN, *WHOLE]),
     priority: 1
     conda:
         "../envs/scenenet.yaml"

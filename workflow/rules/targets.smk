@@ -25,6 +25,23 @@ def every(stage, output, **values):
     return [file for name in names for file in _files(getattr(rules, name), output, values)]
 
 
+def every_prediction(output):
+    """An output of every new survey, of one file or of many."""
+    stages = ["predict", "survey_lists"] if TILED else ["predict"]
+    return [file for stage in stages for file in every(stage, output)]
+
+
+def every_written_tile(w):
+    """What is written for each tile that can be used; known once the towers are found."""
+    return [
+        file
+        for survey in TILED
+        for tile in written_tiles(survey)
+        for pattern in rules.write_tile.output
+        for file in expand(pattern, survey=survey, tile=tile)
+    ]
+
+
 def of_study(study, output):
     """The files of an output of the jobs of a study."""
     jobs = [job for job, (name, _) in STUDY_JOBS.items() if name == study]
@@ -32,13 +49,14 @@ def of_study(study, output):
 
 
 def every_output():
-    """Rule -> every file that it makes, for all rules so far. Synthetic surveys are no targets: what
+    """Rule -> every file that it makes, for all rules so far. Written tiles are known later
+    (``every_written_tile``). Synthetic surveys are no targets: what
     is made from them is complete without them, and to make one again would train everything again.
     """
     return {
         name: [file for output in rule.output.keys() for file in _files(rule, output, {})]
         for name, rule in rules._rules.items()
-        if "synthetic" not in rule.rule.wildcard_names
+        if "synthetic" not in rule.rule.wildcard_names and name != "write_tile"
     }
 
 
@@ -54,6 +72,9 @@ def every_record():
 
 def _files(rule, output, values):
     patterns, declared = (getattr(of.output, output) for of in (rule, rule.rule))
+    if "tile" in rule.rule.wildcard_names:
+        each = [(survey, tile) for survey in TILED for tile in PLANS[survey].tiles]
+        return [f for survey, tile in each for f in expand(patterns, survey=survey, tile=tile)]
     single = isinstance(patterns, str)
     files = expand(list([patterns] if single else patterns), **{**_wildcards(rule), **values})
     # The outputs that ``rules`` hands on have lost this flag.

@@ -28,9 +28,13 @@ THREAD_VARIABLES = (
 )
 
 
-NOT_RECORDED = ("store", "stores", "crop_stores", "towers_record")
+NOT_RECORDED = (
+    *("store", "stores", "crop_stores", "towers_record"),
+    *("works", "predictions", "points"),
+)
 """Inputs without a fingerprint in the record: a manifest has the digest of its store, and the
-record of the labelled towers describes a table that is an input with a fingerprint."""
+record of the labelled towers describes a table that is an input with a fingerprint. The work files
+of a survey of tiles follow from the tiles, whose fingerprints are among the parameters."""
 
 
 RECIPE, UNREADABLE = "recipe:", "unreadable"

@@ -10,6 +10,7 @@ import pandas as pd
 
 from scenenet.core.files import digest
 from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower, TowerColumn
+from scenenet.prediction.summary import PredictionSummary
 from scenenet.report.blocks import (
     Block,
     Column,
@@ -72,6 +73,7 @@ def predictions(context: ReportContext) -> Section | None:
             blocks.append(Link("Map, list and picture of each tower", address))
         blocks += context.figures_of(survey, "predictions")
         blocks.append(_tower_list(survey, found.towers))
+        blocks += _not_predicted(survey, found.summary)
     if not blocks:
         return None
     note = Text(
@@ -80,6 +82,16 @@ def predictions(context: ReportContext) -> Section | None:
         "are in the CRS of the survey; the GeoPackage of each survey opens in any GIS."
     )
     return Section("predictions", "Classified surveys", [note, *blocks])
+
+
+def _not_predicted(survey: str, summary: PredictionSummary) -> list[Block]:
+    """The files of a survey that were not predicted, with the reasons."""
+    rows = [file for file in summary.files if file["error"]]
+    if not rows:
+        return []
+    columns = [Column("file", "file"), Column("status", "status"), Column("error", "reason")]
+    caption = f"{len(rows)} of {len(summary.files)} files of {survey} were not predicted."
+    return [table(pd.DataFrame(rows), columns, caption)]
 
 
 def _tower_list(survey: str, towers: Sequence[SurveyTower]) -> Block:

@@ -1,0 +1,54 @@
+"""Finds the towers of a survey, and the files that each reaches into."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenenet.core.files import atomic, write_json
+from scenenet.detection.settings import DetectionSettings
+from scenenet.prediction.found_towers import find_in_survey
+from scenenet.prediction.jobs.joined import joined_work
+from scenenet.prediction.survey_files import SurveyFiles, result_name
+from scenenet.prediction.work.block_file import BlockFile
+from scenenet.prediction.work.tile_predictions import TilePredictions
+
+
+def find_towers_of(
+    survey: SurveyFiles,
+    works: Sequence[str | Path],
+    predictions: Sequence[str | Path],
+    model: str | Path,
+    detection: DetectionSettings,
+    towers: str | Path,
+    near: str | Path,
+) -> None:
+    """Find the towers of a survey.
+
+    Args:
+        works, predictions: the work file and the predictions of each file of the survey that is not
+            refused, in order.
+        model: model file.
+        towers: file to write (``FoundTowers``).
+        near: folder to write, with a file for each file of the survey that can be used: the towers
+            that reach into it. It stays the same to the byte while these do.
+
+    Raises:
+        InputError: no file can be used, or the model cannot be.
+    """
+    from scenenet.models.model_file import read_model
+
+    tau = read_model(model)[1].threshold()
+    joined = joined_work(survey, works)
+    tiles = TilePredictions([BlockFile(path) for path in predictions])
+    found = find_in_survey(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
+    write_json(towers, found.to_json())
+    usable = {file.name for file in joined.files if file.error is None}
+    with atomic(near) as folder:
+        folder.mkdir()
+        for work in joined.used:
+            if work.file.name in usable:
+                codes = work.blocks.codes("voxels")
+                own = found.structures.reaching(work.lattice, codes)
+                facts = {"system": joined.system.to_json(), "structures": own.to_json()}
+                write_json(folder / f"{result_name(work.file.name)}.json", facts)

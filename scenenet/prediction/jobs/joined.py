@@ -1,0 +1,34 @@
+"""The work files of a survey, joined."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenenet.prediction.survey_files import SurveyFiles
+from scenenet.prediction.work.survey_work import SurveyWork
+from scenenet.prediction.work.tile_predictor import fullest_voxel
+
+
+def joined_work(survey: SurveyFiles, works: Sequence[str | Path]) -> SurveyWork:
+    """The work files of all files of a survey that are not refused, in order, as one survey.
+
+    Raises:
+        InputError: no file can be used.
+    """
+    paths = [path for path in survey.files if path not in survey.refused]
+    return SurveyWork.open(survey, dict(zip(paths, map(Path, works), strict=True)))
+
+
+def fullest_in(survey: SurveyFiles, works: Sequence[str | Path], model: str | Path) -> int:
+    """Points in the fullest voxel of a survey.
+
+    Args:
+        works: the work file of each file of the survey that is not refused, in order.
+
+    Raises:
+        InputError: no file can be used.
+    """
+    from scenenet.models.model_file import read_model
+
+    return fullest_voxel(joined_work(survey, works).spool, read_model(model)[1])

@@ -1,0 +1,76 @@
+"""Predicts a file of a survey with its neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenenet.core.errors import InputError
+from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.work.survey_work import belonging
+from scenenet.prediction.work.tile_predictor import (
+    needed_around,
+    observed_voxel_size,
+    predict_file,
+)
+from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.work_file import WorkFile
+
+
+def model_voxel_size(model: str | Path, settings: PredictSettings) -> float:
+    """m, edge of the voxels in which a model observes surveys.
+
+    Raises:
+        InputError: the model cannot be used.
+    """
+    from scenenet.models.model_file import read_model
+
+    trained, card = read_model(model)
+    card.threshold()  # fail before the work: without tau there is no tower
+    return observed_voxel_size(trained, card, settings)
+
+
+def predict_tile(
+    work: str | Path,
+    neighbours: Sequence[str | Path],
+    model: str | Path,
+    out: str | Path,
+    within: float,
+    fullest: int | None,
+) -> None:
+    """Predict a file of a survey, with its neighbours as surroundings.
+
+    Args:
+        work: its work file.
+        neighbours: the work files of all files within a distance of it.
+        model: model file.
+        out: file of predictions to write.
+        within: that distance, m.
+        fullest: points in the fullest voxel of the survey (``fullest_in``), for a model that
+            measures density; None for others.
+
+    Raises:
+        InputError: the distance is too small for the voxels of the model, or the model cannot be
+            used.
+    """
+    from scenenet.models.model_file import read_model
+
+    trained, card = read_model(model)
+    own = WorkFile.open(work)
+    needed = needed_around(trained, own.lattice.voxel_size)
+    if needed > within:
+        raise InputError(
+            f"voxels of {own.lattice.voxel_size:g} m need the tiles within {needed:.0f} m, and the "
+            f"workflow takes those within {within:g} m for neighbours",
+            file=model,
+            remedy="Set predict.voxel_size to a smaller value, or predict the survey with "
+            "scenenet predict",
+        )
+    if card.measurement == "density" and fullest is None:
+        raise InputError(
+            "the model measures density, which its training settings do not say", file=model
+        )
+    near = [own, *map(WorkFile.open, neighbours)]
+    same = [] if own.system is None else list(belonging(near, own.system))
+    spool = TileSpool(own.lattice, (each.blocks for each in same))
+    predict_file(own, spool, out, trained, card, fullest or 1)

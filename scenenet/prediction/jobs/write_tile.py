@@ -1,0 +1,55 @@
+"""Writes the points of a file of a survey back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenenet.core.files import atomic, read_json, write_json
+from scenenet.core.provenance import fingerprint
+from scenenet.prediction.point_writer import write_points
+from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.work.block_file import BlockFile
+from scenenet.prediction.work.point_predictions import PointLookUp
+from scenenet.prediction.work.structures import Structures
+from scenenet.prediction.work.survey_system import SurveySystem
+from scenenet.prediction.work.tile_predictions import TilePredictions
+from scenenet.prediction.work.work_file import WorkFile
+
+if TYPE_CHECKING:
+    import pyproj
+
+
+def write_tile(
+    work: str | Path,
+    predictions: str | Path,
+    near: str | Path,
+    points: str | Path,
+    record: str | Path,
+    settings: PredictSettings,
+    crs: pyproj.CRS | None,
+) -> None:
+    """Write the points of a file of a survey, and what was counted in them.
+
+    Args:
+        work, predictions: of the file.
+        near: the towers that reach into it, as ``find_towers_of`` wrote them.
+        points: LAZ file to write.
+        record: file to write (``SurveyFile``).
+        crs: system of a file that states none; None if it is not known.
+
+    Raises:
+        InputError: the file changed after it was read.
+    """
+    own, facts = WorkFile.open(work), read_json(near)
+    system = SurveySystem.from_json(facts["system"])
+    look_up = PointLookUp(
+        TilePredictions([BlockFile(predictions)]),
+        Structures.from_json(facts["structures"]),
+        own.lattice,
+        system.unit_sizes,
+    )
+    with atomic(points) as partial:
+        file = write_points(own.file, look_up, partial, settings, crs)
+    written = {"file": file.to_record(), "fingerprint": fingerprint(points)}
+    write_json(record, written)

@@ -1,0 +1,23 @@
+"""Write the points of a tile of a survey, classified."""
+
+import _job
+
+
+def write_tile(job: _job.Job) -> None:
+    from scenenet.pointcloud.las.crs import named_system
+    from scenenet.prediction.jobs import write_tile as stage
+    from scenenet.prediction.settings import PredictSettings
+
+    given = job.identity.get("crs")
+    stage.write_tile(
+        job.input.work,
+        job.input.predictions,
+        job.input.near,
+        job.output.points,
+        job.output.record,
+        PredictSettings(**job.settings),
+        None if given is None else named_system(given),
+    )
+
+
+_job.run(write_tile)

@@ -21,6 +21,24 @@ def written_tiles(survey):
     return [tile for tile in PLANS[survey].tiles if (near / f"{tile}.json").exists()]
 
 
+TOGETHER = 20
+"""Tiles whose jobs of one stage are one job of a scheduler, if its profile says so
+(``group-components``)."""
+NUMBERS = {survey: {tile: n for n, tile in enumerate(plan.tiles)} for survey, plan in PLANS.items()}
+
+
+def together(stage):
+    """The group of the jobs of a stage: tiles that follow one another. Snakemake joins all
+    components of one name again and again, each time that it plans, so the name has the limit."""
+
+    def group(w):
+        name = f"{stage}-{w.survey}-{NUMBERS[w.survey][w.tile] // TOGETHER}"
+        workflow.parent_groupids[name] = stage
+        return name
+
+    return group
+
+
 def fullest_file(w):
     """The number by which a model scales that measures density; all tiles decide on it."""
     return [f"{R}/predict/{w.survey}/work/fullest.json"] if DENSITY else []

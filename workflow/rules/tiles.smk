@@ -40,12 +40,14 @@ rule read_tile:
         f"{R}/benchmarks/read_tile/{{survey}}/{{tile}}.tsv"
     wildcard_constraints:
         survey=any_of(TILED),
+    group:
+        together("read_tile")
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000, 2),
-        runtime=60,
+        runtime=20,
     params:
         job=lambda w: job(
             "read_tile",
@@ -105,12 +107,14 @@ rule predict_tile:
         f"{R}/benchmarks/predict_tile/{{survey}}/{{tile}}.tsv"
     wildcard_constraints:
         survey=any_of(TILED),
+    group:
+        together("predict_tile")
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1500, 1),
-        runtime=60,
+        runtime=20,
     params:
         job=job("predict_tile", {}, within=NEIGHBOURS_M),
     message:
@@ -166,12 +170,14 @@ rule write_tile:
         f"{R}/benchmarks/write_tile/{{survey}}/{{tile}}.tsv"
     wildcard_constraints:
         survey=any_of(TILED),
+    group:
+        together("write_tile")
     conda:
         "../envs/scenenet.yaml"
     threads: 1
     resources:
         mem_mb=megabytes(1000, 2),
-        runtime=60,
+        runtime=20,
     params:
         job=lambda w: job(
             "write_tile",

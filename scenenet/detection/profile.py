@@ -91,19 +91,22 @@ def furthest(height: float) -> float:
     return SHIFT_M + 3 * slim(height) + 1
 
 
-def fit_profile(s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float) -> Profile | None:
+def fit_profile(
+    s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float, shift: float = SHIFT_M
+) -> Profile | None:
     """The body near an approximate axis, or None where nothing stands free.
 
     Args:
         s, t, h: (N,) m.
         height: m, approximate height of the tower.
+        shift: m, largest distance of the axis from the approximate one, at most ``SHIFT_M``.
     """
     inside = (h >= SCRUB_M) & (h <= height)
     inside &= np.maximum(np.abs(s), np.abs(t)) <= furthest(height)
     s, t, h = s[inside], t[inside], h[inside]
     best: tuple[float, float, np.ndarray, float] | None = None
     for level in LEVELS_M:
-        found = _search(s, t, h, height, level)
+        found = _search(s, t, h, height, level, shift)
         if found is None:
             continue
         share, width, centre, points = found
@@ -129,7 +132,7 @@ def fit_profile(s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float) -> P
 
 
 def _search(
-    s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float, level: float
+    s: np.ndarray, t: np.ndarray, h: np.ndarray, height: float, level: float, shift: float
 ) -> tuple[float, float, np.ndarray, float] | None:
     """The prism of constant width with most free levels.
 
@@ -139,7 +142,7 @@ def _search(
     n_levels = max(1, int(np.ceil(height / level)))
     best: tuple[float, float, np.ndarray, float] | None = None
     merit = 0.0
-    prisms = [_Prism.of(width) for width in WIDTHS_M if width <= slim(height)]
+    prisms = [_Prism.of(width, shift) for width in WIDTHS_M if width <= slim(height)]
     summed: dict[float, np.ndarray] = {}
     for width, prism in zip(WIDTHS_M, prisms, strict=False):
         cell, reach, margin = prism.cell, prism.reach, prism.margin
@@ -180,11 +183,11 @@ class _Prism(NamedTuple):
     n: int
 
     @classmethod
-    def of(cls, width: float) -> _Prism:
-        """The prism with this half width in m."""
+    def of(cls, width: float, shift: float) -> _Prism:
+        """The prism with this half width in m, up to ``shift`` m from the approximate axis."""
         cell = 0.1 if width < 1 else 0.2
         reach, margin = round(width / cell), round(max(GAP_M, GAP_SHARE * width) / cell)
-        return cls(cell, reach, margin, round(SHIFT_M / cell) + reach + margin + 1)
+        return cls(cell, reach, margin, round(shift / cell) + reach + margin + 1)
 
     def crop(self, summed: np.ndarray) -> np.ndarray:
         """The part of the sums (L, C, C) of a wider prism that this one needs."""

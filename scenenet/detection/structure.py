@@ -25,7 +25,7 @@ from scenenet.detection.conductors import Span
 from scenenet.detection.ground import Ground, fit_ground
 from scenenet.detection.head import ARM_M, NO_HEAD, Head, find_head
 from scenenet.detection.portal import find_twin
-from scenenet.detection.profile import GAP_M, SCRUB_M, Profile, fit_profile, furthest
+from scenenet.detection.profile import GAP_M, SCRUB_M, SHIFT_M, Profile, fit_profile, furthest
 
 MARGIN_M = 0.1
 """m around members: noise of ranging and of the axis."""
@@ -55,6 +55,10 @@ UPRIGHT_M = 1.5
 
 TOP_GAP = 3.0
 """m without a point that end a body upwards, so that a bird above it is not its top."""
+
+AMID_SHIFT_M = 1.0
+"""m, largest distance of the axis of a window tower from the middle of its conductors. Further away
+is one of its legs."""
 
 
 Leaving = Callable[[np.ndarray, float, float, float], Sequence[Span]]
@@ -205,23 +209,22 @@ def measure_structure(
         if not spans or max(sides) - min(sides) < WINDOW_M:
             return None
     start = axis + _middle(spans) if amid else axis
-    body = _measure_body(
-        points, start, _along(spans), height if first is None else first.height + 1
-    )
+    tall, shift = (height, AMID_SHIFT_M) if first is None else (first.height + 1, SHIFT_M)
+    body = _measure_body(points, start, _along(spans), tall, shift)
     if body is None or not tests.passed(body):
         return None
     return _with_head(_with_twin(body, points), points, spans, axis)
 
 
 def _measure_body(
-    points: np.ndarray, axis: np.ndarray, along: np.ndarray, height: float
+    points: np.ndarray, axis: np.ndarray, along: np.ndarray, height: float, shift: float = SHIFT_M
 ) -> Structure | None:
     """The body near an axis, without crossarms and conductors."""
     points = _around(points, axis, np.sqrt(2) * furthest(height))
     if len(points) == 0:
         return None
     s, t, h = _frame(points, axis, along, fit_ground(points, axis))
-    profile = fit_profile(s, t, h, height)
+    profile = fit_profile(s, t, h, height, shift)
     if profile is None:
         return None
     axis = axis + profile.s * along + profile.t * _across(along)

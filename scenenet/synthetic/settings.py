@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from scenenet.core.settings import Settings
 
-Kind = Literal["lattice", "lattice_pole", "tubular", "wooden", "h_frame"]
+Kind = Literal["lattice", "lattice_pole", "tubular", "wooden", "h_frame", "window"]
 Obstacle = Literal["mast", "street_light", "house", "dead_tree", "crane", "fence"]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Weight = Annotated[float, Field(ge=0.0)]

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from scenenet.detection.conductor_rules import WIDE
 from scenenet.detection.conductors import ConductorPoints
 from scenenet.detection.structure import BodyTests, measure_structure
 from scenenet.detection.structure_record import from_record, to_record
@@ -18,7 +19,7 @@ ANY = BodyTests(9.0, 0.75, 1 / 3)
 def measured(scene, height, away=(0.8, -0.7), tests=ANY, amid=False):
     axis = scene.foot[:2] + away
     near = np.hypot(*(scene.xyz[:, :2] - axis).T) <= 28
-    crossarm, base = max(3.0, 0.25 * height), scene.foot[2]
+    crossarm, base = max(3.0, 0.25 * (WIDE if amid else 1) * height), scene.foot[2]
     around = surroundings_in(scene.xyz)
     conductors = ConductorPoints(around, 4.5)
 
@@ -150,3 +151,14 @@ def test_reach_covers_every_point_of_a_tower(tower_scene):
     shape = measured(scene, 42)
     own = scene.xyz[shape.contains(scene.xyz)]
     assert np.hypot(own[:, 0] - shape.x, own[:, 1] - shape.y).max() <= shape.reach
+
+
+@pytest.mark.parametrize("away", [(0.0, 0.0), (1.5, 4.0), (-2.0, -3.5)])
+def test_the_axis_of_a_window_tower_is_amid_its_conductors(tower_scene, away):
+    """Either leg stands free over more of the height than the body below them."""
+    scene = tower_scene("window", 24.0, bearing=0.0)
+    shape = measured(scene, 23.0, away, amid=True)
+    assert np.hypot(shape.x - scene.foot[0], shape.y - scene.foot[1]) < 0.6
+    precision, recall = points_score(shape, scene)
+    assert precision > 0.9
+    assert recall > 0.6  # its legs end above the conductors, where nothing shows a head

@@ -229,6 +229,40 @@ def h_frame(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_
     return Structure(frame.array(), np.asarray(points), half)
 
 
+def window(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
+    """A pylon whose body divides into two legs below a beam; a conductor passes between them.
+
+    Conductors are at one level, on both sides and in the window. Earth wires are on the legs.
+    """
+    frame = _Frame()
+    base, waist = (0.11 * height, 0.066 * height) if size.width is None else (size.width / 2,) * 2
+    fork, beam, reach = 0.42 * height, 0.7 * height, size.reach_or(0.36 * height)
+    levels = np.linspace(0, fork, max(4, round(fork / 2.5)) + 1)
+    halves = np.interp(levels, [0, fork], [base, waist])
+    _lattice_body(frame, np.r_[-BELOW_GROUND_M, levels], np.r_[base, halves], leg=0.06, brace=0.035)
+    apart, thick = 0.6 * reach, 0.3 * waist
+    for side in (-1, 1):
+        steps = np.linspace(0, 1, max(4, round((height - fork) / 2)) + 1)
+        middles = side * np.interp(fork + steps * (height - fork), [fork, beam, height],
+                                   [waist - thick, apart, apart])  # fmt: skip
+        z = fork + steps * (height - fork)
+        for k in range(len(steps) - 1):
+            for x, y in ((-thick, -thick), (thick, -thick), (thick, thick), (-thick, thick)):
+                low = (middles[k] + x, y, z[k])
+                frame.bar(low, (middles[k + 1] + x, y, z[k + 1]), 0.05)
+                frame.bar(low, (middles[k + 1] - x, y, z[k + 1]), 0.03)
+    for y in (-thick, thick):
+        for x in np.linspace(-reach, 0.8 * reach, 10):
+            step = 0.2 * reach
+            frame.bar((x, y, beam), (x + step, y, beam), 0.05)
+            frame.bar((x, y, beam), (x + step, y, beam + 2 * thick), 0.03)
+            frame.bar((x, y, beam + 2 * thick), (x + step, y, beam + 2 * thick), 0.05)
+    shares = (-0.95, 0.0, 0.95) if circuits == 1 else (-0.95, -0.75, -0.2, 0.2, 0.75, 0.95)
+    points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.1 * height)
+    points += [(side * apart, 0.0, height) for side in (1, -1)[:earth_wires]]
+    return Structure(frame.array(), np.asarray(points), base)
+
+
 KINDS: Mapping[str, Callable[[float, int, int, Size], Structure]] = MappingProxyType(
     {
         "lattice": lattice,
@@ -236,6 +270,7 @@ KINDS: Mapping[str, Callable[[float, int, int, Size], Structure]] = MappingProxy
         "tubular": tubular,
         "wooden": wooden,
         "h_frame": h_frame,
+        "window": window,
     }
 )
 

@@ -17,6 +17,7 @@ def write_tile(job: _job.Job) -> None:
         job.output.record,
         PredictSettings(**job.settings),
         None if given is None else named_system(given),
+        job.identity["input"]["tile"],
     )
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenenet.core.files import atomic, read_json, write_json
-from scenenet.core.provenance import fingerprint
+from scenenet.core.provenance import fingerprint, is_still
+from scenenet.core.unchanged import FileState
 from scenenet.prediction.point_writer import write_points
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.block_file import BlockFile
@@ -28,6 +30,7 @@ def write_tile(
     record: str | Path,
     settings: PredictSettings,
     crs: pyproj.CRS | None,
+    known: str | None = None,
 ) -> None:
     """Write the points of a file of a survey, and what was counted in them.
 
@@ -37,6 +40,8 @@ def write_tile(
         points: LAZ file to write.
         record: file to write (``SurveyFile``).
         crs: system of a file that states none; None if it is not known.
+        known: fingerprint of the file. A copy of the file that was read has the same one, and may
+            have taken its place; None if only that file itself may be written.
 
     Raises:
         InputError: the file changed after it was read.
@@ -49,7 +54,10 @@ def write_tile(
         own.lattice,
         system.unit_sizes,
     )
+    file = own.file
+    if known is not None and known == own.known and is_still(file.path, known):
+        file = replace(file, state=FileState.of(file.path))
     with atomic(points) as partial:
-        file = write_points(own.file, look_up, partial, settings, crs)
+        file = write_points(file, look_up, partial, settings, crs)
     written = {"file": file.to_record(), "fingerprint": fingerprint(points)}
     write_json(record, written)

@@ -33,12 +33,14 @@ class WorkFile:
         system: its coordinates; None if its header cannot be used.
         lattice: of its voxels.
         blocks: its voxels and points (``tiling.TileSpool`` reads them).
+        known: fingerprint by which it was planned; None if it was not.
     """
 
     file: SurveyFile
     system: SurveySystem | None
     lattice: Lattice
     blocks: BlockFile
+    known: str | None = None
 
     @classmethod
     def open(cls, path: str | Path) -> WorkFile:
@@ -55,6 +57,7 @@ class WorkFile:
             None if system is None else SurveySystem.from_json(system),
             Lattice(facts["voxel_size"]),
             blocks,
+            facts["known"],
         )
 
 
@@ -150,8 +153,12 @@ def read_file(
             raise
         except InputError as error:
             file = replace(file, error=error)
-        known = None if system is None else system.to_json()
-        blocks.end({"file": file.to_record(), "system": known, "voxel_size": voxel_size})
+        blocks.end({
+            "file": file.to_record(),
+            "system": None if system is None else system.to_json(),
+            "voxel_size": voxel_size,
+            "known": None if planned is None else planned.known,
+        })  # fmt: skip
     return file
 
 

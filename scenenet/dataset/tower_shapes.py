@@ -15,7 +15,8 @@ import numpy as np
 from scenenet.dataset.crops import Crop
 from scenenet.detection.candidates import SURROUNDINGS_M
 from scenenet.detection.conductors import ConductorPoints, Span
-from scenenet.detection.structure import BodyTests, Structure, measure_structure
+from scenenet.detection.measure_structure import measure_structure
+from scenenet.detection.structure import BodyTests, Structure
 from scenenet.detection.surroundings import surroundings_in
 from scenenet.pointcloud.cloud import PointCloud
 

@@ -11,9 +11,10 @@ from scenenet.detection.candidates import SURROUNDINGS_M, DetectedVoxels
 from scenenet.detection.conductor_rules import FAR, FURTHEST_M, HEAD, WIDE, WIDEST_HEAD_M
 from scenenet.detection.conductors import ConductorPoints, Span
 from scenenet.detection.following import leads_on
+from scenenet.detection.measure_structure import measure_structure
 from scenenet.detection.rough import RoughTower, rough_towers
 from scenenet.detection.settings import DetectionSettings
-from scenenet.detection.structure import BodyTests, Structure, measure_structure
+from scenenet.detection.structure import BodyTests, Structure
 from scenenet.detection.surroundings import Surroundings
 
 MIN_FREE = 1 / 3

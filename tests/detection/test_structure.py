@@ -9,7 +9,8 @@ import pytest
 
 from scenenet.detection.conductor_rules import WIDE
 from scenenet.detection.conductors import ConductorPoints
-from scenenet.detection.structure import BodyTests, measure_structure
+from scenenet.detection.measure_structure import measure_structure
+from scenenet.detection.structure import BodyTests
 from scenenet.detection.structure_record import from_record, to_record
 from scenenet.detection.surroundings import surroundings_in
 

@@ -59,8 +59,9 @@ class StudySettings(Settings):
         if not self.variants and not self.vary:
             raise ValueError(f"study {self.name}: give variants, or vary, or both")
         names = [variant.name for variant in self.all_variants()]
-        if twice := sorted({name for name in names if names.count(name) > 1}):
-            raise ValueError(f"study {self.name}: {', '.join(twice)} is listed more than once")
+        for listed in (names, [f"seed {seed}" for seed in self.seeds]):
+            if twice := sorted({name for name in listed if listed.count(name) > 1}):
+                raise ValueError(f"study {self.name}: {', '.join(twice)} is listed more than once")
         return self
 
     def all_variants(self) -> tuple[Variant, ...]:

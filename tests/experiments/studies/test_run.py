@@ -132,11 +132,13 @@ def test_jobs_divide_the_seeds_and_keep_the_variants_of_a_seed_together():
     assert list(defined.jobs(1)) == [f"seeds-{seed}" for seed in range(5)]
 
 
-def test_a_study_without_variants_is_refused():
+def test_a_study_without_variants_or_with_equal_ones_is_refused():
     with pytest.raises(ValueError, match="give variants, or vary, or both"):
         study()
-    with pytest.raises(ValueError, match="more than once"):
+    with pytest.raises(ValueError, match="a is listed more than once"):
         study(variants=[{"name": "a"}, {"name": "a"}])
+    with pytest.raises(ValueError, match="seed 2 is listed more than once"):
+        study(variants=[{"name": "a"}], seeds=(0, 2, 2))
 
 
 def files(folder):

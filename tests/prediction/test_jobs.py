@@ -14,7 +14,7 @@ from scenenet.core.files import write_json
 from scenenet.core.provenance import fingerprint
 from scenenet.detection.settings import DetectionSettings
 from scenenet.models.model_file import write_model
-from scenenet.pointcloud import PointCloud, write_las
+from scenenet.pointcloud import PointCloud, read, write_las
 from scenenet.pointcloud.reading import survey_info
 from scenenet.prediction.jobs.find_towers import find_towers_of
 from scenenet.prediction.jobs.joined import fullest_in
@@ -58,13 +58,28 @@ def run_jobs(survey: SurveyFiles, model: Path, folder: Path, fullest: bool) -> P
         predict_tile(works[number], works[:number] + works[number + 1 :], model, out, 400.0, most)
     find_towers_of(survey, works, predictions, model, LONE_POLES, work / "towers", work / "near")
     records = [out.with_suffix(".json") for out in works]
-    for number, path in enumerate(survey.files):
+    written = [path.stem for path in survey.files if (work / "near" / f"{path.stem}.json").exists()]
+    for number, path in enumerate(survey.files[: len(written)]):
         near = work / "near" / f"{path.stem}.json"
         write_tile(works[number], predictions[number], near, files.points[path], records[number],
                    SETTINGS, None)  # fmt: skip
-    write_lists(survey, works, predictions, work / "towers", records, model, files, SETTINGS,
+    done = records[: len(written)]
+    write_lists(survey, works, predictions, work / "towers", done, model, files, SETTINGS,
                 LONE_POLES)  # fmt: skip
     return files
+
+
+def same_files(survey: SurveyFiles, model: Path, folder: Path, density: bool) -> PredictionFiles:
+    """Predict a survey in one process and by jobs, and compare every file but the summary."""
+    one = PredictionFiles.of(survey, folder / "one")
+    predict_to_files(survey, model, one, SETTINGS, LONE_POLES)
+    jobs = run_jobs(survey, model, folder / "jobs", density)
+    for path in [*one.points.values(), *one.lists]:
+        twin = folder / "jobs" / path.relative_to(folder / "one")
+        assert path.exists() == twin.exists()
+        if path.exists():
+            assert twin.read_bytes() == path.read_bytes(), path.name
+    return jobs
 
 
 @pytest.mark.parametrize("measurement", ["presence", "density"])
@@ -72,14 +87,18 @@ def test_jobs_give_the_files_of_one_process(tiles, pole_finder, tmp_path, measur
     trained, card = pole_finder
     model = tmp_path / "model.json"
     write_model(model, trained, card.model_copy(update={"measurement": measurement}))
-    survey = SurveyFiles.of(tiles)
-    one = PredictionFiles.of(survey, tmp_path / "one")
-    predict_to_files(survey, model, one, SETTINGS, LONE_POLES)
-    jobs = run_jobs(survey, model, tmp_path / "jobs", measurement == "density")
-    for path in [*one.points.values(), *one.lists]:
-        twin = tmp_path / "jobs" / path.relative_to(tmp_path / "one")
-        assert twin.read_bytes() == path.read_bytes(), path.name
+    jobs = same_files(SurveyFiles.of(tiles), model, tmp_path, measurement == "density")
     assert all(jobs.is_own(path) for path in [*jobs.points.values(), *jobs.lists, jobs.summary])
+
+
+def test_a_file_in_another_system_at_the_same_numbers_has_no_effect(tiles, model, tmp_path):
+    folder = tmp_path / "line"
+    shutil.copytree(tiles, folder)
+    points = read(tiles / "b.laz")
+    few = PointCloud(points.xyz[::7], points.classification[::7], crs=pyproj.CRS(32630))
+    write_las(folder / "c.laz", few)
+    jobs = same_files(SurveyFiles.of(folder), model, tmp_path, density=False)
+    assert "c.laz,left out" in jobs.status.read_text()
 
 
 def test_a_distance_that_is_too_small_for_the_voxels_is_refused(tiles, model, tmp_path):

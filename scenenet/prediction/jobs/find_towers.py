@@ -8,10 +8,8 @@ from pathlib import Path
 from scenenet.core.files import atomic, write_json
 from scenenet.detection.settings import DetectionSettings
 from scenenet.prediction.found_towers import find_in_survey
-from scenenet.prediction.jobs.joined import joined_work
+from scenenet.prediction.jobs.joined import joined_predictions, joined_work
 from scenenet.prediction.survey_files import SurveyFiles, result_name
-from scenenet.prediction.work.block_file import BlockFile
-from scenenet.prediction.work.tile_predictions import TilePredictions
 
 
 def find_towers_of(
@@ -40,7 +38,7 @@ def find_towers_of(
 
     tau = read_model(model)[1].threshold()
     joined = joined_work(survey, works)
-    tiles = TilePredictions([BlockFile(path) for path in predictions])
+    tiles = joined_predictions(joined, predictions)
     found = find_in_survey(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
     write_json(towers, found.to_json())
     usable = {file.name for file in joined.files if file.error is None}

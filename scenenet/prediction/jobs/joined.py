@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenenet.prediction.survey_files import SurveyFiles
+from scenenet.prediction.work.block_file import BlockFile
 from scenenet.prediction.work.survey_work import SurveyWork
+from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tile_predictor import fullest_voxel
 
 
@@ -18,6 +20,19 @@ def joined_work(survey: SurveyFiles, works: Sequence[str | Path]) -> SurveyWork:
     """
     paths = [path for path in survey.files if path not in survey.refused]
     return SurveyWork.open(survey, dict(zip(paths, map(Path, works), strict=True)))
+
+
+def joined_predictions(joined: SurveyWork, predictions: Sequence[str | Path]) -> TilePredictions:
+    """The predictions for the files of a survey. Those of a file in another coordinate system are
+    left out: it was predicted by itself, perhaps at the same numbers.
+
+    Args:
+        predictions: of each file of the survey that is not refused, in order.
+    """
+    paths = [path for path in joined.survey.files if path not in joined.survey.refused]
+    used = {work.file.path for work in joined.used}
+    each = zip(paths, predictions, strict=True)
+    return TilePredictions([BlockFile(file) for path, file in each if path in used])
 
 
 def fullest_in(survey: SurveyFiles, works: Sequence[str | Path], model: str | Path) -> int:

@@ -10,14 +10,12 @@ from scenenet.core.files import read_json
 from scenenet.detection.settings import DetectionSettings
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.found_towers import FoundTowers
-from scenenet.prediction.jobs.joined import joined_work
+from scenenet.prediction.jobs.joined import joined_predictions, joined_work
 from scenenet.prediction.predict import SurveyPrediction
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
 from scenenet.prediction.survey_files import SurveyFiles
-from scenenet.prediction.work.block_file import BlockFile
-from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.writers import write_all_lists
 
 
@@ -62,7 +60,7 @@ def write_lists(
         spool=joined.spool,
         towers=found.towers,
         structures=found.structures,
-        tiles=TilePredictions([BlockFile(path) for path in predictions]),
+        tiles=joined_predictions(joined, predictions),
         started=started,
     )
     prediction.warn()

@@ -40,6 +40,7 @@ rule read_tile:
         f"{R}/benchmarks/read_tile/{{survey}}/{{tile}}.tsv"
     wildcard_constraints:
         survey=any_of(TILED),
+    retries: 1
     group:
         together("read_tile")
     conda:
@@ -107,6 +108,7 @@ rule predict_tile:
         f"{R}/benchmarks/predict_tile/{{survey}}/{{tile}}.tsv"
     wildcard_constraints:
         survey=any_of(TILED),
+    retries: 1
     group:
         together("predict_tile")
     conda:
@@ -170,6 +172,7 @@ rule write_tile:
         f"{R}/benchmarks/write_tile/{{survey}}/{{tile}}.tsv"
     wildcard_constraints:
         survey=any_of(TILED),
+    retries: 1
     group:
         together("write_tile")
     conda:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -131,7 +132,12 @@ def test_a_killed_run_goes_on(tiles, model, tmp_path, steps, expected):
         "from prediction.test_resume import run\n"
         f"run(*map(Path, {[str(tiles), str(model), str(tmp_path / 'out')]!r}))"
     )
-    process = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )
     assert process.stdout.readline() == "now\n"
     process.send_signal(signal.SIGKILL)
     process.communicate()

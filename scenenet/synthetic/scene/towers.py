@@ -251,14 +251,16 @@ def window(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_K
                 low = (middles[k] + x, y, z[k])
                 frame.bar(low, (middles[k + 1] + x, y, z[k + 1]), 0.05)
                 frame.bar(low, (middles[k + 1] - x, y, z[k + 1]), 0.03)
+        for x, y in ((-thick, -thick), (thick, -thick), (thick, thick), (-thick, thick)):
+            frame.bar((side * apart + x, y, height), (side * apart, 0, height), 0.04)
     for y in (-thick, thick):
         for x in np.linspace(-reach, 0.8 * reach, 10):
             step = 0.2 * reach
             frame.bar((x, y, beam), (x + step, y, beam), 0.05)
             frame.bar((x, y, beam), (x + step, y, beam + 2 * thick), 0.03)
             frame.bar((x, y, beam + 2 * thick), (x + step, y, beam + 2 * thick), 0.05)
-    shares = (-0.95, 0.0, 0.95) if circuits == 1 else (-0.95, -0.75, -0.2, 0.2, 0.75, 0.95)
-    points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.1 * height)
+    shares = (-1.0, 0.0, 1.0) if circuits == 1 else (-1.0, -0.75, -0.2, 0.2, 0.75, 1.0)
+    points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.08 * height)
     points += [(side * apart, 0.0, height) for side in (1, -1)[:earth_wires]]
     return Structure(frame.array(), np.asarray(points), base)
 

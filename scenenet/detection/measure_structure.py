@@ -50,8 +50,8 @@ TOP_GAP = 3.0
 """m without a point that end a body upwards, so that a bird above it is not its top."""
 
 AMID_SHIFT_M = 1.0
-"""m, largest distance of the axis of a window tower from the middle of its conductors. Further away
-is one of its legs."""
+"""m, largest distance of the axis of a window tower from the middle of its conductors, where they
+leave in two directions. Further away is one of its legs."""
 
 
 Leaving = Callable[[np.ndarray, float, float, float], Sequence[Span]]
@@ -101,7 +101,8 @@ def measure_structure(
         if not spans or max(sides) - min(sides) < WINDOW_M:
             return None
     start = axis + middle_of(spans) if amid else axis
-    tall, shift = (height, AMID_SHIFT_M) if first is None else (first.height + 1, SHIFT_M)
+    tall = height if first is None else first.height + 1
+    shift = AMID_SHIFT_M if amid and len(spans) > 1 else SHIFT_M
     body = _measure_body(points, start, direction_of(spans), tall, shift)
     if body is None or not tests.passed(body):
         return None

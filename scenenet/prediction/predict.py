@@ -87,6 +87,35 @@ class SurveyPrediction:
     tiles: TilePredictions
     started: float
 
+    @classmethod
+    def of(
+        cls,
+        work: SurveyWork,
+        tiles: TilePredictions,
+        found: FoundTowers,
+        *,
+        model: VoxelModel,
+        card: ModelCard,
+        settings: PredictSettings,
+        detection: DetectionSettings,
+        started: float,
+    ) -> SurveyPrediction:
+        """What was read, predicted and found."""
+        return cls(
+            survey=work.survey,
+            files=work.files,
+            model=model,
+            card=card,
+            settings=settings,
+            detection=detection,
+            system=work.system,
+            spool=work.spool,
+            towers=found.towers,
+            structures=found.structures,
+            tiles=tiles,
+            started=started,
+        )
+
     @property
     def crs(self) -> pyproj.CRS | None:
         """CRS of the survey; None where its files name none."""
@@ -208,18 +237,14 @@ def predict_survey(
             found = find_in_survey(joined.spool, tiles, sizes, tau, detection, label)
             write_json(folder.towers, found.to_json())
         found = FoundTowers.from_json(read_json(folder.towers))
-        yield SurveyPrediction(
-            survey=survey,
-            files=joined.files,
+        yield SurveyPrediction.of(
+            joined,
+            tiles,
+            found,
             model=trained,
             card=card,
             settings=settings,
             detection=detection,
-            system=joined.system,
-            spool=joined.spool,
-            towers=found.towers,
-            structures=found.structures,
-            tiles=tiles,
             started=started,
         )
 

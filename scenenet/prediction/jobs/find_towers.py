@@ -39,7 +39,8 @@ def find_towers_of(
     tau = read_model(model)[1].threshold()
     joined = joined_work(survey, works)
     tiles = joined_predictions(joined, predictions)
-    found = find_in_survey(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
+    label, sizes = f"{survey.name}: candidates measured", joined.system.unit_sizes
+    found = find_in_survey(joined.spool, tiles, sizes, tau, detection, label)
     write_json(towers, found.to_json())
     usable = {file.name for file in joined.files if file.error is None}
     with atomic(near) as folder:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from scenenet.core.files import read_json
@@ -38,6 +39,10 @@ def write_lists(
         records: of the files whose points were written (``write_tile``).
         model: model file.
         files: the results.
+
+    Raises:
+        InputError: no file can be used, or the model cannot be.
+        OutputError: a file cannot be written.
     """
     from scenenet.models.model_file import read_model
 
@@ -48,21 +53,18 @@ def write_lists(
     for record in map(read_json, records):
         file = SurveyFile.from_record(record["file"])
         written[file.name] = file, record["fingerprint"]
-    found = FoundTowers.from_json(read_json(towers))
-    prediction = SurveyPrediction(
-        survey=survey,
-        files=tuple(written.get(file.name, (file, ""))[0] for file in joined.files),
+    prediction = SurveyPrediction.of(
+        joined,
+        joined_predictions(joined, predictions),
+        FoundTowers.from_json(read_json(towers)),
         model=trained,
         card=card,
         settings=settings,
         detection=detection,
-        system=joined.system,
-        spool=joined.spool,
-        towers=found.towers,
-        structures=found.structures,
-        tiles=joined_predictions(joined, predictions),
         started=started,
     )
+    read = tuple(written.get(file.name, (file, ""))[0] for file in joined.files)
+    prediction = replace(prediction, files=read)
     prediction.warn()
     outputs = {files.key(files.points[f.path]): known for f, known in written.values()}
     return write_all_lists(prediction, files, outputs)

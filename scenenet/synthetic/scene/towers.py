@@ -20,6 +20,9 @@ BELOW_GROUND_M = 1.5
 EARTH_WIRES_APART_M = 1.2
 """Half the distance between two earth wires, m."""
 
+CORNERS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+"""Signs of x and y at the corners of a square, in order."""
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -75,10 +78,9 @@ def _lattice_body(
     frame: _Frame, levels: np.ndarray, halves: np.ndarray, leg: float, brace: float
 ) -> None:
     """Four legs and X-braced faces: a square of half side ``halves[k]`` at height ``levels[k]``."""
-    corners = ((-1, -1), (1, -1), (1, 1), (-1, 1))
     for k in range(len(levels) - 1):
         z0, z1, h0, h1 = levels[k], levels[k + 1], halves[k], halves[k + 1]
-        for (ax, ay), (bx, by) in zip(corners, (*corners[1:], corners[0]), strict=True):
+        for (ax, ay), (bx, by) in zip(CORNERS, (*CORNERS[1:], CORNERS[0]), strict=True):
             frame.bar((ax * h0, ay * h0, z0), (ax * h1, ay * h1, z1), leg)
             if z0 >= 0:
                 frame.bar((ax * h0, ay * h0, z0), (bx * h1, by * h1, z1), brace)
@@ -157,7 +159,7 @@ def lattice(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_
     leg, brace = 0.06, 0.035
     below = base + (base - waist) / waist_z * BELOW_GROUND_M
     _lattice_body(frame, np.r_[-BELOW_GROUND_M, levels], np.r_[below, halves], leg, brace)
-    for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+    for sx, sy in CORNERS:
         frame.bar((sx * shoulder, sy * shoulder, peak), (0, 0, height), 0.04)
     if circuits == 1:
         arms = [(-0.12, 0.74), (0.11, 0.86), (0.12, 0.74)]
@@ -241,18 +243,10 @@ def window(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_K
     halves = np.interp(levels, [0, fork], [base, waist])
     _lattice_body(frame, np.r_[-BELOW_GROUND_M, levels], np.r_[base, halves], leg=0.06, brace=0.035)
     apart, thick = 0.6 * reach, 0.3 * waist
+    z = np.linspace(fork, height, max(4, round((height - fork) / 2)) + 1)
+    aside = np.interp(z, [fork, beam, height], [waist - thick, apart, apart])
     for side in (-1, 1):
-        steps = np.linspace(0, 1, max(4, round((height - fork) / 2)) + 1)
-        middles = side * np.interp(fork + steps * (height - fork), [fork, beam, height],
-                                   [waist - thick, apart, apart])  # fmt: skip
-        z = fork + steps * (height - fork)
-        for k in range(len(steps) - 1):
-            for x, y in ((-thick, -thick), (thick, -thick), (thick, thick), (-thick, thick)):
-                low = (middles[k] + x, y, z[k])
-                frame.bar(low, (middles[k + 1] + x, y, z[k + 1]), 0.05)
-                frame.bar(low, (middles[k + 1] - x, y, z[k + 1]), 0.03)
-        for x, y in ((-thick, -thick), (thick, -thick), (thick, thick), (-thick, thick)):
-            frame.bar((side * apart + x, y, height), (side * apart, 0, height), 0.04)
+        _leg(frame, side * aside, z, thick)
     for y in (-thick, thick):
         for x in np.linspace(-reach, 0.8 * reach, 10):
             step = 0.2 * reach
@@ -263,6 +257,18 @@ def window(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_K
     points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.08 * height)
     points += [(side * apart, 0.0, height) for side in (1, -1)[:earth_wires]]
     return Structure(frame.array(), np.asarray(points), base)
+
+
+def _leg(frame: _Frame, middles: np.ndarray, z: np.ndarray, half: float) -> None:
+    """A leg of a window: four bars with a brace on two sides, about ``middles`` x at heights z,
+    that meet in a point at the top."""
+    corners = [(half * sx, half * sy) for sx, sy in CORNERS]
+    for low, high, z0, z1 in zip(middles, middles[1:], z, z[1:], strict=False):
+        for x, y in corners:
+            frame.bar((low + x, y, z0), (high + x, y, z1), 0.05)
+            frame.bar((low + x, y, z0), (high - x, y, z1), 0.03)
+    for x, y in corners:
+        frame.bar((middles[-1] + x, y, z[-1]), (middles[-1], 0, z[-1]), 0.04)
 
 
 KINDS: Mapping[str, Callable[[float, int, int, Size], Structure]] = MappingProxyType(

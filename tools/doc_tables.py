@@ -27,6 +27,13 @@ def class_schemes() -> str:
     return markdown()
 
 
+def targets() -> str:
+    """Every name of a target, with its codes in each class scheme."""
+    from scenenet.pointcloud.targets import markdown
+
+    return markdown()
+
+
 def scores() -> str:
     """Every score that the tables report."""
     from scenenet.metrics.score_columns import SCORE_COLUMNS
@@ -36,6 +43,7 @@ def scores() -> str:
 
 TABLES: Mapping[str, Callable[[], str]] = {
     "class schemes": class_schemes,
+    "targets": targets,
     "scores": scores,
     "tower list": tower_list,
 }

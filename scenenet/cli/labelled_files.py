@@ -23,23 +23,24 @@ from scenenet.dataset.crops import (
 )
 from scenenet.dataset.labelled_towers import LabelledTowers, TowerSettings, survey_towers
 from scenenet.dataset.split import SplitSettings, split_crops
+from scenenet.dataset.square_settings import SquareSettings
+from scenenet.dataset.squares import cut_squares
 from scenenet.dataset.voxel_cache import VOXEL_BYTES, Dataset, build, load
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.result import Evaluation, PointScores, TowerScores
-from scenenet.evaluation.scoring import score
-from scenenet.evaluation.surveys import LabelledSurvey, SurveyScores, score_survey
+from scenenet.evaluation.surveys import LabelledSurvey
 from scenenet.evaluation.tune import with_answer
 from scenenet.interpretability.determination import determination
 from scenenet.interpretability.parameter_sentences import parameters_of
 from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
-from scenenet.models.model_file import read_model, write_model
+from scenenet.models.model_file import write_model
 from scenenet.models.settings import ModelSettings, TuningSettings
-from scenenet.pointcloud import PointCloud, survey_in_metres
+from scenenet.pointcloud import PointCloud, class_scheme, survey_in_metres
 from scenenet.pointcloud.quality.screening import survey_warnings
 from scenenet.pointcloud.reading import same_points
+from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.pointcloud.ts40k import sample_files
 from scenenet.training.train import card_of, fit
 from scenenet.training.tuning import choose
@@ -78,22 +79,28 @@ def read_labelled(
     scratch: Path,
     split: SplitSettings | None = None,
     truths: Sequence[Path] = (),
+    target: Target = TOWER,
+    squares: SquareSettings | None = None,
 ) -> LabelledFiles:
-    """Cut crops around the labelled towers of files, and voxelise them.
+    """Cut crops around the labelled towers of files, or squares that hold another target, and
+    voxelise them.
 
     Args:
-        paths: surveys (cut into crops around their towers), and TS40K samples or folders of them.
+        paths: surveys (cut into crops), and TS40K samples or folders of them.
         codes: class scheme of the labels.
         failures: gets the errors of the files that cannot be read; the others are read.
         scratch: an empty folder, for the points of the crops.
         split: the shares of the split; a single crop is not split.
         truths: for each of ``paths`` a file with the same points in the same order, with the true
             classes, or a folder of such samples; empty where the truth is not known.
+        target: what is labelled in the voxels.
+        squares: size of a crop for another target than towers; the default if None.
 
     Raises:
         OutputError: the disk of the temporary files has too little space.
     """
     files = LabelledFiles()
+    wanted = _Wanted(codes, grid, target, squares or SquareSettings())
     pairs: list[tuple[Path, Path | None]] = [
         (path, truths[number] if truths else None) for number, path in enumerate(paths)
     ]
@@ -110,7 +117,7 @@ def read_labelled(
         used = [path] if truth is None else [path, truth]
         with failures.collect(), unchanged(*used), in_file(path):
             folder = scratch / f"{number}"
-            manifests.append(_read_file(path, truth, name, codes, grid, folder, files))
+            manifests.append(_read_file(path, truth, name, wanted, folder, files))
     crops = [crops for crops, _ in manifests]
     dataset = load([voxels for _, voxels in manifests])
     parts = {}
@@ -137,12 +144,21 @@ def _look(pair: tuple[Path, Path | None]) -> CropSpace:
     return CropSpace.of(path)
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """What is wanted of labelled files: the arguments of ``read_labelled``."""
+
+    codes: str
+    grid: VoxelSettings
+    target: Target
+    squares: SquareSettings
+
+
 def _read_file(
     path: Path,
     truth: Path | None,
     name: str,
-    codes: str,
-    grid: VoxelSettings,
+    wanted: _Wanted,
     folder: Path,
     files: LabelledFiles,
 ) -> tuple[Path, Path]:
@@ -151,12 +167,30 @@ def _read_file(
     Returns:
         the manifests of its crops and of their grids, in ``folder``.
     """
-    found = survey_towers(path, codes, TowerSettings())
-    warnings = survey_warnings(path, codes)
+    warnings = survey_warnings(path, wanted.codes, wanted.target)
+    crops, voxels = folder / "crops.json", folder / "voxels.json"
+    cut = _cut_towers if wanted.target.is_tower else _cut_squares
+    surveys = cut(path, truth, name, wanted, crops, files)
     warn(path, warnings)
     files.warnings.extend(f"{path}: {text}" for text in warnings)
+    build(crops, wanted.grid, folder / "voxels.zarr.zip", voxels)
+    files.read.append(path)
+    files.surveys.extend(surveys)
+    return crops, voxels
+
+
+def _cut_towers(
+    path: Path,
+    truth: Path | None,
+    name: str,
+    wanted: _Wanted,
+    crops: Path,
+    files: LabelledFiles,
+) -> list[LabelledSurvey]:
+    """Cut the surroundings of the towers of a file into the manifest ``crops``."""
+    codes = wanted.codes
+    found = survey_towers(path, codes, TowerSettings())
     files.skipped.extend({"sample": path.name, "reason": note} for note in found.notes())
-    crops, voxels = folder / "crops.json", folder / "voxels.json"
     standing = None
     if truth is not None:
         true = survey_towers(truth, codes, TowerSettings())
@@ -164,40 +198,56 @@ def _read_file(
             {"sample": path.name, "reason": f"in the truth, {note}"} for note in true.notes()
         )
         standing = Truth(truth, true.towers)
-    facts = cut_crops(
-        name, path, codes, found.towers, CropSettings(), folder / "crops.zarr.zip", crops, standing
-    )
-    build(crops, grid, folder / "voxels.zarr.zip", voxels)
-    files.read.append(path)
+    store = crops.with_name("crops.zarr.zip")
+    facts = cut_crops(name, path, codes, found.towers, CropSettings(), store, crops, standing)
     files.skipped.extend(facts["skipped"])
-    cut = [crop_of(entry) for entry in facts["crops"]]
-    files.surveys.extend(_surveys(path, name, codes, found, standing, cut))
     if not sample_files(path) and len(found.towers) == 0:
         labelled = int(found.left_out["points"].sum())
         reason = f"no tower among its {labelled} points labelled tower"
         files.skipped.append({"sample": path.name, "reason": reason})
-    return crops, voxels
+    cut = [crop_of(entry) for entry in facts["crops"]]
+    return list(_surveys(path, name, wanted, found, standing, cut))
+
+
+def _cut_squares(
+    path: Path,
+    truth: Path | None,
+    name: str,
+    wanted: _Wanted,
+    crops: Path,
+    files: LabelledFiles,
+) -> list[LabelledSurvey]:
+    """Cut the squares of a file that hold the target into the manifest ``crops``."""
+    codes, target, store = wanted.codes, wanted.target, crops.with_name("crops.zarr.zip")
+    facts = cut_squares(name, path, codes, target, wanted.squares, store, crops, truth)
+    files.skipped.extend(facts["skipped"])
+    cut = [crop_of(entry) for entry in facts["crops"]]
+    none = LabelledTowers.none()
+    if sample_files(path):
+        none.towers["sample"] = ""
+    standing = None if truth is None else Truth(truth, none.towers)
+    return list(_surveys(path, name, wanted, none, standing, cut))
 
 
 def _surveys(
     path: Path,
     name: str,
-    codes: str,
+    wanted: _Wanted,
     found: LabelledTowers,
     truth: Truth | None,
     crops: Sequence[Crop],
 ) -> Iterator[LabelledSurvey]:
     """The survey at ``path``, or each of its TS40K samples."""
-    samples = sample_files(path)
+    samples, facts = sample_files(path), (wanted.codes, wanted.target)
     if not samples:
         of_truth = () if truth is None else (truth.path, truth.towers)
-        yield LabelledSurvey(path, codes, found.towers, tuple(crops), False, *of_truth)
+        yield LabelledSurvey(path, *facts, found.towers, tuple(crops), False, *of_truth)
     for sample in samples:
         towers = found.towers[found.towers["sample"] == sample.stem]
         own = tuple(crop for crop in crops if crop.id == f"{name}-{sample.stem}")
         true = None if truth is None else truth.of_sample(sample)
         of_truth = () if truth is None or true is None else (true, truth.towers_in(true))
-        yield LabelledSurvey(sample, codes, towers, own, True, *of_truth)
+        yield LabelledSurvey(sample, *facts, towers, own, True, *of_truth)
 
 
 def train_files(
@@ -212,6 +262,7 @@ def train_files(
     provenance: dict[str, Any],
     out: str | Path,
     failures: Failures,
+    squares: SquareSettings | None = None,
 ) -> dict[str, Any]:
     """Train with several seeds, tune each model on the validation crops, and write the best one.
 
@@ -219,6 +270,7 @@ def train_files(
         validation: share of the crops for tuning. With 0 or a single crop, models are tuned on the
             training crops. The scores are then too high, and ``tuned_on`` is ``training``.
         detection: what makes a tower; the model whose towers are best is chosen.
+        squares: size of a crop for another target than towers; the default if None.
 
     Returns:
         the scores of each seed, the chosen seed, the parameters of the chosen model and whether
@@ -226,15 +278,18 @@ def train_files(
         about the files.
 
     Raises:
-        InputError: no file has a labelled tower.
+        InputError: no file has a point labelled with the target of the model.
         typer.Exit: no file could be read.
     """
+    target = settings.finds
     split = SplitSettings(train=1 - validation, validation=validation, test=0, neighbour=0)
     with scratch_folder() as scratch:
         wanted = split if validation > 0 else None
-        files = read_labelled(paths, codes, grid, failures, scratch, wanted)
+        files = read_labelled(
+            paths, codes, grid, failures, scratch, wanted, target=target, squares=squares
+        )
         data = files.dataset
-        _require_crops(files, paths, failures)
+        require_crops(files, paths, failures, target, codes)
         kept = [s for s in data.samples if files.parts.get(s.id) == "validation"]
         provenance = provenance | {"files": [path.name for path in files.read]}
         training = [s for s in data.samples if files.parts.get(s.id) != "validation"]
@@ -250,6 +305,7 @@ def train_files(
     write_model(out, tuned, card)
     return {
         "model": str(out),
+        "target": target.name,
         "seed": seed,
         "tau": result.tau,
         "kernel_size": list(result.kernel_size),
@@ -292,85 +348,23 @@ def _numbers(chosen: VoxelModel, models: Sequence[VoxelModel]) -> list[dict[str,
     ]
 
 
-def evaluate_files(
-    paths: Sequence[Path],
-    model: str | Path,
-    codes: str,
-    grid: VoxelSettings | None,
-    detection: DetectionSettings,
-    failures: Failures,
-    truths: Sequence[Path] = (),
-) -> dict[str, Any]:
-    """Scores of a model on labelled files, against their labels and against the truth.
-
-    Points are scored by the prediction that ``scenenet predict`` makes for each file, whatever the
-    grid.
-
-    Args:
-        grid: the grid for the voxel scores; None for the model's own voxel size. With None, towers
-            are detected in whole surveys instead of crops around the labelled towers, so that
-            false towers everywhere count, also in surveys without towers.
-        truths: as in ``read_labelled``.
-
-    Returns:
-        the evaluation as plain values, with ``skipped`` and ``warnings``.
-
-    Raises:
-        InputError: the model cannot be used, or no file has a crop or survey to score.
-        typer.Exit: no file could be read.
-    """
-    trained, card = read_model(model)
-    whole_surveys = grid is None
-    grid = grid or VoxelSettings(fit="metric", voxel_size=card.voxel_size)
-    with scratch_folder() as scratch:
-        files = read_labelled(paths, codes, grid, failures, scratch, truths=truths)
-    if not (whole_surveys and files.surveys):
-        _require_crops(files, paths, failures)
-    found = SurveyScores()
-    grids = {sample.id: sample.grid for sample in files.dataset.samples}
-    for survey in files.surveys:
-        with failures.collect():
-            found += score_survey(survey, model, detection, grids)
-    scored = files.dataset.only(found.by_crop)
-    result = score(trained, card, scored, lambda sample: found.by_crop[sample.id])
-    result = _of_whole_files(result, found, towers=whole_surveys)
-    return result.to_json() | {"skipped": files.skipped, "warnings": files.warnings}
-
-
-def _of_whole_files(result: Evaluation, found: SurveyScores, *, towers: bool) -> Evaluation:
-    """The scores of crops with the points of whole files instead, and with their towers if asked.
-
-    Without a crop there is nothing to count in voxels, neither for the labels nor for the truth.
-    """
-    true = found.points.truth
-    truth = None if true is None else result.truth or result.labels
-    if truth is not None and true is not None:
-        truth = replace(truth, points=PointScores.of(true))
-        if towers and found.true_towers is not None:
-            truth = replace(truth, towers=TowerScores.of(found.true_towers))
-    of_labels = found.points.labels_against_truth
-    return replace(
-        result,
-        points=PointScores.of(found.points.labels),
-        towers=TowerScores.of(found.towers) if towers else result.towers,
-        truth=truth,
-        labels_against_truth=None if of_labels is None else PointScores.of(of_labels),
-    )
-
-
-def _require_crops(files: LabelledFiles, paths: Sequence[Path], failures: Failures) -> None:
+def require_crops(
+    files: LabelledFiles, paths: Sequence[Path], failures: Failures, target: Target, codes: str
+) -> None:
     """End the command if there is no crop.
 
     Raises:
         typer.Exit: because files failed.
-        InputError: because no file has a labelled tower.
+        InputError: because no file has a point labelled ``target`` in the scheme ``codes``.
     """
     if files.dataset.samples:
         return
     failures.end()
     reasons = "; ".join(f"{entry['sample']}: {entry['reason']}" for entry in files.skipped)
+    own = sorted(target.codes_in(class_scheme(codes)))
     raise InputError(
-        f"no labelled tower in it ({reasons})",
+        f"no labelled {target.name} in it ({reasons})",
         file=", ".join(str(path) for path in paths),
-        remedy="Check --codes, and that the points of towers are labelled 15",
+        remedy=f"Check --codes, and that the points of {target.name} are labelled "
+        f"{' or '.join(map(str, own))}",
     )

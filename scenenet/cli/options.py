@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Annotated, get_args
 
 import typer
 
+from scenenet.core.errors import InputError
 from scenenet.dataset import voxels
 from scenenet.models import settings
 from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.class_schemes import SCHEMES, difference
+from scenenet.pointcloud.targets import Target
 
 if TYPE_CHECKING:
     import pyproj
@@ -118,6 +120,23 @@ def cube(resolution: int) -> VoxelSettings:
         known = ", ".join(map(str, _RESOLUTIONS))
         raise typer.BadParameter(f"must be one of {known}", param_hint="--resolution")
     return voxels.VoxelSettings(fit="cube", resolution=resolution)
+
+
+def metric(voxel_size: float) -> VoxelSettings:
+    """A grid with voxels of ``voxel_size`` m."""
+    return voxels.VoxelSettings(fit="metric", voxel_size=voxel_size)
+
+
+def target_of(text: str) -> Target:
+    """The target of ``--target``.
+
+    Raises:
+        typer.BadParameter: there is no such target.
+    """
+    try:
+        return Target.parse(text)
+    except InputError as error:
+        raise typer.BadParameter(str(error), param_hint="--target") from None
 
 
 def coordinate_system(text: str | None) -> pyproj.CRS | None:

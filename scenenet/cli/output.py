@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from scenenet.metrics.score_columns import SCORE_COLUMNS, score_text
+from scenenet.pointcloud.targets import TOWER, Target
 
 
 def show(data: Any, as_json: bool, lines: Callable[[Any], list[str]]) -> None:
@@ -22,7 +23,7 @@ def training_lines(result: dict[str, Any]) -> list[str]:
         f"tau {result['tau']:.3f}, kernel {'x'.join(map(str, result['kernel_size']))}, "
         f"on the {result['tuned_on']} crops: P {score_text(scores['precision'])} "
         f"R {score_text(scores['recall'])} F0.5 {score_text(scores['f05'], 3)} "
-        f"tower IoU {score_text(scores['iou_tower'], 3)}",
+        f"{result['target']} IoU {score_text(scores['iou_tower'], 3)}",
     ]
     if (whole := result["whole_towers"]) is not None:
         lines.append(
@@ -51,25 +52,40 @@ def _number_lines(numbers: list[dict[str, Any]]) -> list[str]:
 def score_lines(result: dict[str, Any]) -> list[str]:
     """The scores against the truth, where it is known, and those against the labels."""
     truth, of_labels = result["truth"], result["labels_against_truth"]
+    target = Target.parse(result.get("target", TOWER.text)).name
     if truth is None:
-        return _scores(result, result["model"], "labelled")
+        return _scores(result, result["model"], "labelled", target)
     return [
         "against the truth",
-        *_scores(truth, result["model"], "true"),
-        "the labels themselves: " + _points(of_labels, "labelled tower", "true"),
+        *_scores(truth, result["model"], "true", target),
+        "the labels themselves: " + _points(of_labels, f"labelled {target}", "true", target),
         "",
         "against the labels",
-        *_scores(result, result["model"], "labelled"),
+        *_scores(result, result["model"], "labelled", target),
     ]
 
 
-def _scores(result: dict[str, Any], model: str, kind: str) -> list[str]:
+def _scores(result: dict[str, Any], model: str, kind: str, target: str) -> list[str]:
     def row(name: str, scores: dict[str, float | None]) -> str:
         values = [scores[column.name] for column in SCORE_COLUMNS]
         cells = ["-" if value is None else f"{value:.3f}" for value in values]
         return f"{name:<24}" + "".join(f"{cell:>10}" for cell in cells)
 
+    voxels = [
+        f"{'':<24}" + "".join(f"{column.label:>10}" for column in SCORE_COLUMNS),
+        row(model, result["voxel"]),
+        row("  occupied voxels only", result["voxel_occupied"]),
+        row("predicting nothing", result["voxel_trivial"]),
+        f"{result['voxel']['n_samples']} crops, tau {result['voxel']['tau']:.3f}",
+    ]
     towers = result["towers"]
+    if towers is None:
+        points = _points(result["points"], "at or above tau", kind, target)
+        return [*voxels, f"points: {points}"]
+    voxels[3:3] = [
+        row("  voxels at or above tau", result["voxel_observer"]),
+        row("  whole towers", result["voxel_towers"]),
+    ]
     errors = [
         f", median {what} error {towers[name]:.2f} m"
         for what, name in (
@@ -80,23 +96,17 @@ def _scores(result: dict[str, Any], model: str, kind: str) -> list[str]:
         if towers[name] is not None
     ]
     return [
-        f"{'':<24}" + "".join(f"{column.label:>10}" for column in SCORE_COLUMNS),
-        row(model, result["voxel"]),
-        row("  occupied voxels only", result["voxel_occupied"]),
-        row("  voxels at or above tau", result["voxel_observer"]),
-        row("  whole towers", result["voxel_towers"]),
-        row("predicting nothing", result["voxel_trivial"]),
-        f"{result['voxel']['n_samples']} crops, tau {result['voxel']['tau']:.3f}",
+        *voxels,
         f"towers: {towers['n_predicted']} found, {towers['n_true']} {kind}, "
         f"precision {score_text(towers['precision'])}, recall {score_text(towers['recall'])}"
         + "".join(errors),
-        "points: " + _points(result["points"], "with a tower id", kind),
+        "points: " + _points(result["points"], "with a tower id", kind, target),
     ]
 
 
-def _points(points: dict[str, Any], predicted: str, kind: str) -> str:
+def _points(points: dict[str, Any], predicted: str, kind: str, target: str) -> str:
     return (
-        f"{points['n_predicted']:,} {predicted}, {points['n_true']:,} {kind} tower points, "
+        f"{points['n_predicted']:,} {predicted}, {points['n_true']:,} {kind} {target} points, "
         f"precision {score_text(points['precision'])}, recall {score_text(points['recall'])}, "
         f"IoU {score_text(points['iou'])}"
     )

@@ -225,6 +225,11 @@ class Config(Settings):
                 f"{', '.join(known)}"
             )
         for model in self.models:
+            if not model.finds.is_tower:
+                raise ValueError(
+                    f"model {model.name}: target {model.target}: the workflow trains models of "
+                    "towers; train others with scenenet train --target"
+                )
             if not model.training.epochs:
                 raise ValueError(
                     f"model {model.name}: training.epochs 0 is only for a study; give at least 1"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,14 +15,14 @@ from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
 from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.settings import Settings
+from scenenet.dataset.crop_spool import RECORD, append, spooled
 from scenenet.dataset.tower_places import TowerPlaces
 from scenenet.dataset.zarr_store import StoreReader, create
 from scenenet.pointcloud import iter_chunks, read, survey_info
 from scenenet.pointcloud.class_schemes import class_scheme
 from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.pointcloud.ts40k import sample_files
-
-_RECORD = np.dtype([("xyz", "<f8", 3), ("classification", "u1"), ("truth", "u1")])
 
 CROP_BYTES = 18
 """Bytes that a point takes in a store; most measured: 17.1. Between a tenth of the points of a
@@ -64,7 +64,7 @@ class CropSpace:
             points = sum(sample.stat().st_size for sample in samples) // SAMPLE_BYTES
             return cls(points, CROP_BYTES * points, 0)
         points = survey_info(path).n_points
-        return cls(points, CROP_BYTES * points, _RECORD.itemsize * points)
+        return cls(points, CROP_BYTES * points, RECORD.itemsize * points)
 
 
 @dataclass(frozen=True)
@@ -73,11 +73,13 @@ class Crop:
 
     Attributes:
         id: unique name, SURVEY-NUMBER or SURVEY-SAMPLE.
-        x, y: centre of its tower, m.
-        radius: planar radius, m.
+        x, y: its centre, that of its tower, m.
+        radius: planar radius, m; half the edge of a square crop.
         towers: (T, 4) of all labelled towers in the crop, m: x and y of the centre, elevation of
             the ground under it and height above it, both NaN without ground points there.
         true_towers: the same of all true towers in the crop; None where the truth is not known.
+        square: whether it is a square of the ground plan (``scenenet.dataset.squares``) instead of
+            the surroundings of a tower.
     """
 
     id: str
@@ -86,6 +88,16 @@ class Crop:
     radius: float
     towers: np.ndarray
     true_towers: np.ndarray | None = None
+    square: bool = False
+
+    def inside(self, places: np.ndarray) -> np.ndarray:
+        """Rows of the places (N, 2 or more) m in the crop."""
+        offset = places[:, :2] - (self.x, self.y)
+        if self.square:
+            return np.flatnonzero(((offset >= -self.radius) & (offset < self.radius)).all(axis=1))
+        # The bounding square first: two comparisons exclude most points, which are far away.
+        near = np.flatnonzero((np.abs(offset) <= self.radius).all(axis=1))
+        return near[(offset[near] ** 2).sum(axis=1) <= self.radius**2]
 
 
 @dataclass(frozen=True)
@@ -154,11 +166,32 @@ def cut_crops(
         if samples
         else _cut(survey, path, codes, towers, settings, truth)
     )
+    return store_crops(clouds, facts, store, manifest, TOWER)
+
+
+def store_crops(
+    clouds: Iterable[tuple[Crop, PointCloud]],
+    facts: dict[str, Any],
+    store: str | Path,
+    manifest: str | Path,
+    target: Target,
+) -> dict[str, Any]:
+    """Write crops with their points.
+
+    Args:
+        clouds: the crops; a list that ``facts`` holds may grow while they are cut.
+        facts: of the manifest, with an empty list ``crops``.
+        store, manifest: as ``cut_crops``.
+        target: what the crops are for.
+
+    Returns:
+        the manifest, as ``cut_crops``.
+    """
     with create(store, manifest, facts) as writer:
         for crop, cloud in clouds:
             arrays = {"xyz": cloud.xyz, "classification": cloud.classification}
             writer.add(crop.id, arrays | ({} if cloud.truth is None else {"truth": cloud.truth}))
-            facts["crops"].append(_entry(crop, cloud))
+            facts["crops"].append(_entry(crop, cloud, target))
     return facts
 
 
@@ -206,13 +239,15 @@ def crop_of(entry: dict[str, Any]) -> Crop:
     towers = np.asarray(entry["towers"], float).reshape(-1, 4)
     true = entry.get("true_towers")
     true_towers = None if true is None else np.asarray(true, float).reshape(-1, 4)
-    return Crop(entry["id"], entry["x"], entry["y"], entry["radius"], towers, true_towers)
+    place = entry["x"], entry["y"], entry["radius"]
+    return Crop(entry["id"], *place, towers, true_towers, entry.get("square", False))
 
 
-def _entry(crop: Crop, cloud: PointCloud) -> dict[str, Any]:
-    """The entry of a crop in the manifest. ``labelled`` is the number of its points labelled tower,
-    ``wrong`` how many of these are no tower in truth, null where the truth is not known."""
-    true = cloud.is_true_tower
+def _entry(crop: Crop, cloud: PointCloud, target: Target) -> dict[str, Any]:
+    """The entry of a crop in the manifest. ``labelled`` is the number of its points labelled with
+    the target, ``wrong`` how many of these are something else in truth, null where the truth is not
+    known. Only square crops have ``square``."""
+    labelled, true = cloud.is_labelled(target), cloud.is_truly(target)
     return {
         "id": crop.id,
         "x": crop.x,
@@ -221,9 +256,9 @@ def _entry(crop: Crop, cloud: PointCloud) -> dict[str, Any]:
         "towers": _plain(crop.towers),
         "true_towers": None if crop.true_towers is None else _plain(crop.true_towers),
         "points": len(cloud),
-        "labelled": int(cloud.is_tower.sum()),
-        "wrong": None if true is None else int((cloud.is_tower & ~true).sum()),
-    }
+        "labelled": int(labelled.sum()),
+        "wrong": None if true is None else int((labelled & ~true).sum()),
+    } | ({"square": True} if crop.square else {})
 
 
 def _plain(towers: np.ndarray) -> list[list[float | None]]:
@@ -244,28 +279,26 @@ def _cut(
     scheme = class_scheme(codes)
     with scratch_folder() as folder:
         spools = [folder / f"{number}" for number in towers["tower"]]
+        crops = [
+            Crop(f"{survey}-{number:04d}", x, y, radius, np.empty((0, 4)))
+            for number, (x, y), radius in zip(
+                towers["tower"], centres.tolist(), radii.tolist(), strict=True
+            )
+        ]
         for spool in spools:
             spool.touch()
         chunks = iter_chunks(path, codes, truth=None if truth is None else truth.path)
         for chunk in track(chunks, f"{survey}: chunks read"):
             for number in _reaching(chunk, centres, radii):
-                _append(spools[number], chunk, centres[number], radii[number])
-        for number, centre, radius, spool in zip(
-            towers["tower"], centres, radii, spools, strict=True
-        ):
-            records = np.fromfile(spool, _RECORD)
-            cloud = PointCloud(
-                np.ascontiguousarray(records["xyz"]),
-                records["classification"].copy(),
-                scheme,
-                truth=None if truth is None else records["truth"].copy(),
-            )
+                append(spools[number], chunk, crops[number].inside(chunk.xyz))
+        for crop, centre, radius, spool in zip(crops, centres, radii, spools, strict=True):
+            cloud = spooled(spool, scheme, truth is not None)
             near = [
                 _within(table, centre, radius)
                 for table in (towers, *(() if truth is None else (truth.towers,)))
             ]
-            name, (x, y) = f"{survey}-{number:04d}", centre.tolist()
-            yield Crop(name, x, y, float(radius), *_places(cloud, *near)), cloud
+            found, true = _places(cloud, *near)
+            yield replace(crop, towers=found, true_towers=true), cloud
 
 
 def _within(towers: pd.DataFrame, centre: np.ndarray, radius: float) -> pd.DataFrame:
@@ -294,22 +327,6 @@ def _reaching(chunk: PointCloud, centres: np.ndarray, radii: np.ndarray) -> np.n
     low, high = places.min(axis=0), places.max(axis=0)
     reach = radii[:, None]
     return np.flatnonzero(((centres > low - reach) & (centres < high + reach)).all(axis=1))
-
-
-def _append(spool: Path, chunk: PointCloud, centre: np.ndarray, radius: float) -> None:
-    """Append the points of ``chunk`` within the crop to its file."""
-    offset = chunk.xyz[:, :2] - centre
-    # The bounding square first: two comparisons exclude most chunks, which are far away.
-    near = np.flatnonzero((np.abs(offset) <= radius).all(axis=1))
-    near = near[(offset[near] ** 2).sum(axis=1) <= radius**2]
-    if len(near) == 0:
-        return
-    records = np.empty(len(near), _RECORD)
-    records["xyz"] = chunk.xyz[near]
-    records["classification"] = chunk.classification[near]
-    records["truth"] = 0 if chunk.truth is None else chunk.truth[near]
-    with spool.open("ab") as stream:
-        stream.write(records.tobytes())
 
 
 def _samples(

@@ -68,6 +68,11 @@ class LabelledTowers:
     towers: pd.DataFrame
     left_out: pd.DataFrame
 
+    @classmethod
+    def none(cls) -> LabelledTowers:
+        """No tower, for labels of something else."""
+        return find_towers(np.empty((0, 3)), TowerSettings())
+
     def notes(self) -> list[str]:
         """A sentence for each row of ``left_out``."""
         return [

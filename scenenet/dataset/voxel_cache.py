@@ -15,6 +15,7 @@ from scenenet.dataset.crops import Crop, crop_of, read_crops
 from scenenet.dataset.tower_shapes import TowerShape, measure_shape
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, VoxelSettings, voxelise
 from scenenet.dataset.zarr_store import StoreReader, create
+from scenenet.pointcloud.targets import TOWER, Target
 
 VOXEL_BYTES = 3
 """Bytes that a point of a crop takes in a store; most measured: 2.7, on fine grids."""
@@ -55,15 +56,18 @@ def build(
         "grid": settings.model_dump(),
         "samples": [],
     }
+    target = Target.parse(reader.manifest.get("target", TOWER.text))
+    if not target.is_tower:
+        facts["target"] = target.text
     entries = {entry["id"]: entry for entry in reader.manifest["crops"]}
     label = f"{facts['survey']}: voxels {settings.label}"
     with create(store, manifest, facts) as writer:
         for crop, cloud in track(read_crops(crops), label, total=len(entries)):
             begin = time.perf_counter()
             with in_file(place=f"crop {crop.id}"):
-                sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id)
+                sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id, target)
             seconds = time.perf_counter() - begin
-            shape = measure_shape(crop, cloud) if shapes else None
+            shape = measure_shape(crop, cloud) if shapes and target.is_tower else None
             arrays = {"index": sample.index, "count": sample.count, "tower": sample.tower}
             if sample.true is not None:
                 arrays["true"] = sample.true
@@ -91,12 +95,14 @@ class Dataset:
         samples, crops: of the same length, in the same order.
         codes: class scheme of the labels; several are joined by ``+``.
         content: digests of the stores that the samples came from.
+        target: what is labelled in the samples.
     """
 
     samples: list[VoxelSample]
     crops: list[Crop]
     codes: str
     content: list[str]
+    target: Target = TOWER
 
     def only(self, ids: Collection[str]) -> Dataset:
         """The data set with the crops of ``ids`` alone."""
@@ -109,13 +115,16 @@ def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Datase
     """Read the samples of some stores: all of them, or those with ``ids``.
 
     Raises:
-        InputError: a store does not match its manifest, or no store has a crop of ``ids``.
+        InputError: a store does not match its manifest, no store has a crop of ``ids``, or the
+            stores have labels of several targets.
     """
     samples, crops, contents, codes = [], [], [], set()
+    targets: dict[str, str | Path] = {}
     for path in manifests:
         reader = StoreReader(path)
         contents.append(reader.manifest["content"])
         codes.add(reader.manifest["codes"])
+        targets.setdefault(reader.manifest.get("target", TOWER.text), path)
         for entry in reader.manifest["samples"]:
             if ids is not None and entry["id"] not in ids:
                 continue
@@ -130,4 +139,11 @@ def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Datase
             file=", ".join(str(path) for path in manifests),
             remedy="Run the split again, and voxelise all of its surveys",
         )
-    return Dataset(samples, crops, "+".join(sorted(codes)), contents)
+    if len(targets) > 1:
+        raise InputError(
+            f"their voxels have labels of several targets: {', '.join(sorted(targets))}",
+            file=", ".join(str(path) for path in targets.values()),
+            remedy="Cut and voxelise all surveys for one target",
+        )
+    target = Target.parse(next(iter(targets), TOWER.text))
+    return Dataset(samples, crops, "+".join(sorted(codes)), contents, target)

@@ -12,6 +12,7 @@ from pydantic import Field
 from scenenet.core.errors import InputError
 from scenenet.core.settings import Settings
 from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.targets import TOWER, Target
 
 if TYPE_CHECKING:
     from scenenet.dataset.tower_shapes import TowerShape
@@ -211,8 +212,11 @@ class VoxelSample:
         return self.index[self.tower]
 
 
-def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSample:
-    """Count points and tower points in each voxel of ``grid``, true tower points too if known.
+def voxelise(
+    cloud: PointCloud, grid: VoxelGrid, sample_id: str = "", target: Target = TOWER
+) -> VoxelSample:
+    """Count points and points labelled ``target`` in each voxel of ``grid``, those that are it in
+    truth too if known.
 
     Raises:
         InputError: the class scheme of the cloud is not known.
@@ -220,9 +224,9 @@ def voxelise(cloud: PointCloud, grid: VoxelGrid, sample_id: str = "") -> VoxelSa
     from scenenet.dataset.voxel_counts import tally
 
     voxel = grid.voxel_of(cloud.xyz)
-    index, count, tower = tally(voxel, cloud.is_tower, grid.n_voxels)
+    index, count, tower = tally(voxel, cloud.is_labelled(target), grid.n_voxels)
     true = None
-    if (is_true := cloud.is_true_tower) is not None:
+    if (is_true := cloud.is_truly(target)) is not None:
         true = np.zeros(len(index), bool)
         true[np.searchsorted(index, voxel[is_true])] = True
     return VoxelSample(sample_id, grid, index, count, tower, true)

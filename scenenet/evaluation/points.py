@@ -1,6 +1,7 @@
-"""Points with a tower id against the points that are tower, in the labels and in truth.
+"""Points that a model takes for its target against those that are it, in the labels and in truth.
 
-The tower ids are those that ``scenenet predict`` writes for the same points.
+For towers these are the points to which ``scenenet predict`` gives a tower id; for another target,
+the points in voxels at or above tau.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.targets import TOWER, Target
 
 
 @dataclass(frozen=True)
@@ -18,9 +20,11 @@ class PointCounts:
     """Counts of points; they add up.
 
     Attributes:
-        labels: points with a tower id against points labelled tower.
-        truth: points with a tower id against true tower points; None where the truth is not known.
-        labels_against_truth: points labelled tower against true tower points; None as ``truth``.
+        labels: points taken for the target against points labelled with it.
+        truth: points taken for the target against those that are it in truth; None where the truth
+            is not known.
+        labels_against_truth: points labelled with the target against those that are it in truth;
+            None as ``truth``.
     """
 
     labels: Confusion = field(default_factory=Confusion)
@@ -28,13 +32,13 @@ class PointCounts:
     labels_against_truth: Confusion | None = None
 
     @classmethod
-    def of(cls, cloud: PointCloud, in_tower: np.ndarray) -> PointCounts:
-        """Count points of which ``in_tower`` (N,) bool have a tower id."""
-        labelled, true = cloud.is_tower, cloud.is_true_tower
-        labels = Confusion.of(in_tower, labelled)
+    def of(cls, cloud: PointCloud, taken: np.ndarray, target: Target = TOWER) -> PointCounts:
+        """Count points of which ``taken`` (N,) bool are taken for the target."""
+        labelled, true = cloud.is_labelled(target), cloud.is_truly(target)
+        labels = Confusion.of(taken, labelled)
         if true is None:
             return cls(labels)
-        return cls(labels, Confusion.of(in_tower, true), Confusion.of(labelled, true))
+        return cls(labels, Confusion.of(taken, true), Confusion.of(labelled, true))
 
     def __add__(self, other: PointCounts) -> PointCounts:
         return PointCounts(

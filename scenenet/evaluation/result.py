@@ -11,6 +11,7 @@ from typing import Any
 
 from scenenet.metrics.tower_matching import TowerMatch
 from scenenet.metrics.voxel_scores import Confusion, VoxelScores
+from scenenet.pointcloud.targets import TOWER
 
 
 @dataclass(frozen=True)
@@ -135,6 +136,11 @@ class Scores:
             KeyError, TypeError: a score is missing or unknown.
         """
         values = {f.name: data[f.name] for f in fields(Scores)}
+        if data["towers"] is None:  # of another target than towers
+            voxel = VoxelScores(**data["voxel"])
+            of_none = VoxelScores.of(Confusion(), voxel.tau, voxel.n_samples)
+            data = {**data, "voxel_towers": asdict(of_none)}
+            data["towers"] = asdict(TowerScores.of(TowerMatch.none()))
         values |= {name: VoxelScores(**data[name]) for name in _VOXELS}
         values["towers"] = TowerScores(**data["towers"])
         values["points"] = _points(data["points"])
@@ -155,6 +161,8 @@ class Evaluation(Scores):
         truth: scores against the truth, on the crops whose truth is known; None without any.
         labels_against_truth: scores of the labels themselves against the truth, counted on the
             points of ``truth.points``; None where those are.
+        target: what the model finds (``scenenet.pointcloud.targets``). Towers and their voxels are
+            null in the files for anything but towers.
         part: part of the split; None without a split.
         parameters: number of parameters; None if the model file has it.
     """
@@ -165,6 +173,7 @@ class Evaluation(Scores):
     whole_towers: bool
     truth: Scores | None
     labels_against_truth: PointScores | None
+    target: str = TOWER.text
     part: str | None = None
     parameters: int | None = None
 
@@ -179,11 +188,17 @@ class Evaluation(Scores):
         return self.truth or self
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values; ``part`` and ``parameters`` are left out if they are None."""
+        """Plain values, without ``part`` and ``parameters`` if they are None, and without a
+        ``target`` that is the tower."""
         values = asdict(self)
+        target = values.pop("target")
         for scores in (values, values["truth"] or {}):
             if "per_sample" in scores:
                 scores["per_sample"] = list(scores["per_sample"])
+                if target != TOWER.text:
+                    scores |= {"towers": None, "voxel_towers": None}
+        if target != TOWER.text:
+            values = {"target": target} | values
         first = ("part", "parameters", "model", "seed", "alive", "whole_towers")
         last = ("truth", "labels_against_truth")
         own = {name: values.pop(name) for name in (*first, *last)}
@@ -203,6 +218,7 @@ class Evaluation(Scores):
             **{name: data[name] for name in ("model", "seed", "alive", "whole_towers")},
             truth=None if data["truth"] is None else Scores.from_json(data["truth"]),
             labels_against_truth=_points(data["labels_against_truth"]),
+            target=data.get("target", TOWER.text),
             part=data.get("part"),
             parameters=data.get("parameters"),
         )

@@ -90,7 +90,7 @@ def score(
     answer: Answering,
 ) -> Evaluation:
     """Scores of a model at its tau over all samples (see ``score_predictions``)."""
-    return score_predictions(
+    scores = score_predictions(
         card.name,
         card.provenance.get("seed"),
         card.threshold(),
@@ -99,6 +99,7 @@ def score(
         answer,
         whole_towers=model.whole_towers,
     )
+    return replace(scores, target=card.target)
 
 
 def score_predictions(

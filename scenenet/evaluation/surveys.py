@@ -20,6 +20,7 @@ from scenenet.evaluation.answers import Answer, places_of
 from scenenet.evaluation.points import PointCounts
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.pointcloud import PointCloud, iter_chunks
+from scenenet.pointcloud.targets import Target
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
 
@@ -31,6 +32,7 @@ class LabelledSurvey:
     Attributes:
         path: the file.
         codes: class scheme of its labels and of its truth.
+        target: what is scored.
         towers: table of its labelled towers (``labelled_towers.COLUMNS``).
         crops: the crops that were cut from it; a TS40K sample is a single crop as it is.
         is_sample: whether it is a TS40K sample.
@@ -40,6 +42,7 @@ class LabelledSurvey:
 
     path: Path
     codes: str
+    target: Target
     towers: pd.DataFrame
     crops: tuple[Crop, ...]
     is_sample: bool
@@ -80,7 +83,8 @@ def score_survey(
     detection: DetectionSettings,
     grids: Mapping[str, VoxelGrid],
 ) -> SurveyScores:
-    """Predict a whole survey at the voxel size of the model, and score its towers and points.
+    """Predict a whole survey at the voxel size of the model, and score its towers and points. For
+    another target than towers there are points alone.
 
     Memory is bounded by a chunk of points and a tile of voxels.
 
@@ -92,7 +96,8 @@ def score_survey(
         InputError: the survey, its truth or the model cannot be used.
     """
     counts, places = PointCounts(), TowerPlaces(survey.towers)
-    crops = [_CropTally(crop, survey.is_sample, grids[crop.id]) for crop in survey.crops]
+    target = survey.target
+    crops = [_CropTally(crop, survey.is_sample, grids[crop.id], target) for crop in survey.crops]
     true_places = None if survey.true_towers is None else TowerPlaces(survey.true_towers)
     settings = PredictSettings()
     with predict_survey(survey.path, model, settings, detection) as prediction:
@@ -100,10 +105,10 @@ def score_survey(
         with unchanged(*files), in_file(survey.path):
             chunks = iter_chunks(survey.path, survey.codes, settings.chunk_points, survey.truth)
             for chunk in track(chunks, f"{survey.path.name}: points scored"):
-                in_tower = prediction.look_up(chunk.xyz).tower_id > 0
-                counts += PointCounts.of(chunk, in_tower)
+                taken = prediction.taken(chunk.xyz)
+                counts += PointCounts.of(chunk, taken, target)
                 for crop in crops:
-                    crop.add(chunk, in_tower)
+                    crop.add(chunk, taken)
                 places.add(chunk)
                 if true_places is not None and (true := chunk.with_truth) is not None:
                     true_places.add(true)
@@ -124,21 +129,23 @@ class _CropTally:
         crop: the crop.
         is_sample: whether it is the whole TS40K sample.
         grid: of its voxels.
+        target: what is scored.
         points: counts of its points so far.
-        voxels: flat indices of the voxels with a point in a tower so far, ascending.
+        voxels: flat indices of the voxels with a point taken for the target so far, ascending.
     """
 
     crop: Crop
     is_sample: bool
     grid: VoxelGrid
+    target: Target
     points: PointCounts = field(default_factory=PointCounts)
     voxels: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
 
-    def add(self, chunk: PointCloud, in_tower: np.ndarray) -> None:
-        """Count the points of a chunk that lie in the crop; ``in_tower`` (N,) bool is of all."""
+    def add(self, chunk: PointCloud, taken: np.ndarray) -> None:
+        """Count the points of a chunk that lie in the crop; ``taken`` (N,) bool is of all."""
         inside = self._inside(chunk.xyz)
-        self.points += PointCounts.of(chunk.select(inside), in_tower[inside])
-        own = chunk.xyz[inside[in_tower[inside]]]
+        self.points += PointCounts.of(chunk.select(inside), taken[inside], self.target)
+        own = chunk.xyz[inside[taken[inside]]]
         self.voxels = np.union1d(self.voxels, self.grid.voxel_of(own))
 
     def answer(self, towers: np.ndarray) -> Answer:
@@ -147,8 +154,4 @@ class _CropTally:
 
     def _inside(self, places: np.ndarray) -> np.ndarray:
         """Rows of the places (N, 2 or more) m in the crop, as ``dataset.crops`` cuts it."""
-        if self.is_sample:
-            return np.arange(len(places))
-        offset = places[:, :2] - (self.crop.x, self.crop.y)
-        near = np.flatnonzero((np.abs(offset) <= self.crop.radius).all(axis=1))
-        return near[(offset[near] ** 2).sum(axis=1) <= self.crop.radius**2]
+        return np.arange(len(places)) if self.is_sample else self.crop.inside(places)

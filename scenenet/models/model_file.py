@@ -9,7 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    TypeAdapter,
+    ValidationError,
+    model_serializer,
+)
 from torch import Tensor
 
 from scenenet.core.errors import InputError
@@ -23,7 +29,8 @@ from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
-from scenenet.models.settings import LARGEST_KERNEL, KernelSize, MetricSettings
+from scenenet.models.settings import LARGEST_KERNEL, KernelSize, MetricSettings, TargetText
+from scenenet.pointcloud.targets import TOWER, Target
 
 FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
@@ -40,6 +47,7 @@ class ModelCard(Settings):
 
     name: str = Field(description="name in results and tables")
     codes: str = Field(description="class scheme of the training labels")
+    target: TargetText = Field(TOWER.text, description="what it finds")
     measurement: Measurement = Field(description="phi of its input")
     fit: Fit = Field(description="kind of grid that it was trained on")
     resolution: int = Field(gt=0, description="voxels per edge of that grid, for fit cube")
@@ -52,6 +60,17 @@ class ModelCard(Settings):
     provenance: dict[str, Any] = Field(
         default_factory=dict, description="seed, configuration, data and code of the training"
     )
+
+    @property
+    def finds(self) -> Target:
+        """What the model finds."""
+        return Target.parse(self.target)
+
+    @model_serializer(mode="wrap")
+    def _plain(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Without the target where it is the tower, as in files of earlier versions."""
+        raw = dump(self)
+        return {n: raw[n] for n in raw if n != "target" or not self.finds.is_tower}
 
     def with_tau(self, tau: float) -> ModelCard:
         """The card with another threshold."""
@@ -284,4 +303,5 @@ def _size(data: Mapping[str, Any]) -> KernelSize:
 
 
 def _card(data: Mapping[str, Any]) -> ModelCard:
-    return ModelCard(**{name: data[name] for name in ModelCard.model_fields})
+    known = {"target": TOWER.text, **data}
+    return ModelCard(**{name: known[name] for name in ModelCard.model_fields})

@@ -23,6 +23,7 @@ from pydantic import (
 import scenenet
 from scenenet.core.settings import Settings
 from scenenet.dataset.voxels import Measurement
+from scenenet.pointcloud.targets import ROLES, TOWER, Target, canonical
 
 LARGEST_KERNEL = 64
 """Largest edge of a kernel, voxels: that of a tile, beyond which a survey cannot be predicted."""
@@ -66,6 +67,8 @@ def _known_kernel(name: str) -> str:
 
 
 Kernel = Annotated[str, AfterValidator(_known_kernel)]
+TargetText = Annotated[str, AfterValidator(canonical)]
+"""What a model finds (``scenenet.pointcloud.targets``), as ``Target.text``."""
 Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH)]
 
 
@@ -200,6 +203,11 @@ class ModelSettings(Settings):
 
     name: str = Field(pattern=r"^[a-z][a-z0-9_-]*$", description="name in results and tables")
     kind: Literal["scenenet", "cnn"] = Field(description="architecture")
+    target: TargetText = Field(
+        TOWER.text,
+        description=f"what the model finds: {', '.join(ROLES)}, or class codes with a name "
+        "(lamp=14,16)",
+    )
     protocol: Protocol = Field(
         "thesis",
         description="thesis: kernels in voxels, trained by gradient (thesis 5.2.1); operational: "
@@ -215,6 +223,11 @@ class ModelSettings(Settings):
     kernel_size: KernelSize = Field((9, 9, 9), description="(kz, ky, kx) in voxels")
     measurement: Measurement = Field("presence", description="phi (thesis 4.2.2, 5.3.2)")
     training: TrainingSettings = TrainingSettings()
+
+    @property
+    def finds(self) -> Target:
+        """What the model finds."""
+        return Target.parse(self.target)
 
     @property
     def gives_whole_towers(self) -> bool:
@@ -248,14 +261,25 @@ class ModelSettings(Settings):
 
     @model_serializer(mode="wrap")
     def _effective(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Only the settings with an effect, so that records of a model contain no others."""
+        """Only the settings with an effect, so that records of a model contain no others. The
+        target is left out where it is the tower, so that records of earlier versions stay valid."""
         raw = dump(self)
-        return {name: raw[name] for name in raw if name not in unused_settings(raw)}
+        usual = {"target"} if self.finds.is_tower else set()
+        return {name: raw[name] for name in raw if name not in {*unused_settings(raw), *usual}}
 
     @classmethod
     def after_changes(cls, raw: dict[str, Any], changed: set[str]) -> dict[str, Any]:
         unused = unused_settings(raw)
         return {name: raw[name] for name in raw if name in changed or name not in unused}
+
+    @model_validator(mode="after")
+    def _only_towers_are_whole(self) -> Self:
+        if self.gives_whole_towers and not self.finds.is_tower:
+            raise ValueError(
+                f"metric.whole_towers: a model of target {self.target} finds no towers; write "
+                "metric: {whole_towers: false}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _init_fits(self) -> Self:

@@ -2,6 +2,7 @@
 
 - ``cloud``: the point cloud that every stage works with.
 - ``class_schemes``: what class codes mean.
+- ``targets``: what an observer finds, as a name and class codes.
 - ``reading``: surveys of any format, whole or in chunks.
 - ``true_classes``: true classes from a second file with the same points.
 - ``file_kinds``: the kind of a file, from its content and suffix.

@@ -131,10 +131,6 @@ class ClassScheme:
         """
         return {entry.name: entry.code for entry in self.codes}[name]
 
-    def is_tower(self, classification: np.ndarray) -> np.ndarray:
-        """(N,) bool: the points labelled tower, from their class codes (N,)."""
-        return np.isin(classification, list(self.tower))
-
     def is_ground(self, classification: np.ndarray) -> np.ndarray:
         """(N,) bool: the points that look like bare ground, from their class codes (N,)."""
         ground = [entry.code for entry in self.codes if entry.drawn_look == "ground"]

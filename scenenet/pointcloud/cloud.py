@@ -9,6 +9,7 @@ import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme
+from scenenet.pointcloud.targets import TOWER, Target
 
 if TYPE_CHECKING:
     import pyproj
@@ -59,7 +60,7 @@ class PointCloud:
         Raises:
             InputError: the class scheme is not known.
         """
-        return self._known_scheme().is_tower(self.classification)
+        return self.is_labelled(TOWER)
 
     @property
     def is_true_tower(self) -> np.ndarray | None:
@@ -68,7 +69,23 @@ class PointCloud:
         Raises:
             InputError: the class scheme is not known.
         """
-        return None if self.truth is None else self._known_scheme().is_tower(self.truth)
+        return self.is_truly(TOWER)
+
+    def is_labelled(self, target: Target) -> np.ndarray:
+        """(N,) bool: points labelled ``target``.
+
+        Raises:
+            InputError: the class scheme is not known.
+        """
+        return target.among(self.classification, self._known_scheme())
+
+    def is_truly(self, target: Target) -> np.ndarray | None:
+        """(N,) bool: points that are ``target`` in truth; None where the truth is not known.
+
+        Raises:
+            InputError: the class scheme is not known.
+        """
+        return None if self.truth is None else target.among(self.truth, self._known_scheme())
 
     @property
     def with_truth(self) -> PointCloud | None:

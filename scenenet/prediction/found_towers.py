@@ -31,6 +31,11 @@ class FoundTowers:
     towers: tuple[SurveyTower, ...]
     structures: Structures
 
+    @classmethod
+    def none(cls) -> FoundTowers:
+        """No tower, because none was looked for."""
+        return cls((), Structures(()))
+
     def to_json(self) -> dict[str, Any]:
         features = [tower.to_feature([tower.x, tower.y, tower.base]) for tower in self.towers]
         return {"towers": features, "structures": self.structures.to_json()}

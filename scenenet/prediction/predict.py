@@ -180,6 +180,14 @@ class SurveyPrediction:
         """(n,) uint32, id of the tower whose shape has each of the points (n, 3) m, 0 for none."""
         return self._owners(xyz)
 
+    def taken(self, xyz: np.ndarray) -> np.ndarray:
+        """(n,) bool, which points (n, 3) of the survey, in its units, are taken for the target of
+        the model: points of towers for a model of towers, else points in voxels at or above tau."""
+        points = self.look_up(xyz)
+        if self.card.finds.is_tower:
+            return points.tower_id > 0
+        return points.probability >= self.card.threshold()
+
     def look_up(self, xyz: np.ndarray) -> PointPredictions:
         """Probability, tower id and shares of points (n, 3) of the survey, in its units."""
         return self.points(xyz)
@@ -193,7 +201,7 @@ def predict_survey(
     detection: DetectionSettings,
     work: WorkFolder | None = None,
 ) -> Iterator[SurveyPrediction]:
-    """Predict every occupied voxel of a survey and find its towers.
+    """Predict every occupied voxel of a survey and, with a model of towers, find its towers.
 
     All files of a survey are read before towers are searched for, so the result does not depend on
     where the survey was cut. Memory is bounded by a chunk of points and a tile of voxels. The
@@ -231,6 +239,8 @@ def predict_survey(
         _read_files(survey, folder, voxel_size, settings.chunk_points)
         joined = SurveyWork.open(survey, folder.reads(survey))
         tiles = _predict_files(joined, folder, trained, card)
+        if not folder.towers.exists() and not card.finds.is_tower:
+            write_json(folder.towers, FoundTowers.none().to_json())
         if not folder.towers.exists():
             label = f"{survey.given.name}: candidates measured"
             sizes = joined.system.unit_sizes

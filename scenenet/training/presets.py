@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from scenenet.models.settings import ModelSettings, TrainingSettings, TuningSettings
+from scenenet.models.settings import (
+    MetricSettings,
+    ModelSettings,
+    TrainingSettings,
+    TuningSettings,
+)
+from scenenet.pointcloud.targets import TOWER, Target
 
 EPOCHS = 150
 """Passes over the crops for training by gradient."""
@@ -32,30 +38,35 @@ def preset(
     epochs: int | None = None,
     learning_rate: float | None = None,
     geneos: Sequence[str] | None = None,
+    target: Target = TOWER,
 ) -> ModelSettings:
     """The settings of a model of ``kind`` trained by ``protocol``.
 
     Args:
         epochs, learning_rate: of training by gradient; None for ``EPOCHS`` and ``LEARNING_RATES``.
         geneos: kernels of a SCENE-Net; None for those of the thesis.
+        target: what the model finds; only a model of towers gives whole towers.
 
     Raises:
         ValueError: epochs or rate are given for a model that is fitted by a search, a kernel is
             unknown, or the model has no kernels to choose.
     """
-    kernels: dict[str, Any] = {} if geneos is None else {"geneos": tuple(geneos)}
+    chosen: dict[str, Any] = {} if geneos is None else {"geneos": tuple(geneos)}
+    chosen["target"] = target.text
+    if is_searched(kind, protocol) and not target.is_tower:
+        chosen["metric"] = MetricSettings(whole_towers=False)
     if is_searched(kind, protocol):
         if epochs is not None or learning_rate is not None:
             raise ValueError("a search has no epochs and no learning rate")
-        return ModelSettings(name=kind, kind=kind, protocol=protocol, **kernels)
+        return ModelSettings(name=kind, kind=kind, protocol=protocol, **chosen)
     training = TrainingSettings(
         init="informed" if protocol == "operational" else "thesis",
         epochs=epochs or EPOCHS,
         learning_rate=learning_rate or LEARNING_RATES[protocol],
     )
     if kind == "cnn":  # the protocol of a CNN is its training
-        return ModelSettings(name=kind, kind=kind, training=training, **kernels)
-    return ModelSettings(name=kind, kind=kind, protocol=protocol, training=training, **kernels)
+        return ModelSettings(name=kind, kind=kind, training=training, **chosen)
+    return ModelSettings(name=kind, kind=kind, protocol=protocol, training=training, **chosen)
 
 
 def validation_share(kind: str, protocol: str) -> float:

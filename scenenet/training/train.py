@@ -43,6 +43,12 @@ def train(
         provenance: written to the model file beside seed and data fingerprint.
     """
     training = load(voxel_manifests, crops_in(split, "train"))
+    if training.target != model.finds:
+        raise InputError(
+            f"the crops are labelled for target {training.target.text}, and the model "
+            f"{model.name!r} finds {model.target}",
+            remedy="Train it with scenenet train, which cuts its own crops",
+        )
     validation = load(voxel_manifests, crops_in(split, "validation"))
     trained, history = fit(
         training.samples, validation.samples, model, seed, checkpoint=Path(checkpoint)
@@ -65,6 +71,7 @@ def card_of(
     return ModelCard(
         name=model.name,
         codes=training.codes,
+        target=model.target,
         measurement=model.measurement,
         fit=grid.fit,
         resolution=grid.resolution,
@@ -106,12 +113,12 @@ def fit(
         the model after the last epoch, and its history (see ``train``).
 
     Raises:
-        InputError: there is no tower voxel to train on, or the training diverged
-            (``scenenet.training.gradient.LostTraining``).
+        InputError: there is no voxel labelled with the target to train on, or the training
+            diverged (``scenenet.training.gradient.LostTraining``).
     """
     if not any(sample.tower.any() for sample in training):
         raise InputError(
-            f"no tower voxel in the {len(training)} training crops",
+            f"no {settings.finds.name} voxel in the {len(training)} training crops",
             remedy="Add labelled crops, and check that their class scheme is the right one",
         )
     state = Checkpoint(checkpoint, identity_of(training, validation, settings, seed))

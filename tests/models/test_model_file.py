@@ -56,6 +56,26 @@ def test_a_model_is_read_back_as_it_was_written(tmp_path, model):
     assert torch.equal(back.observer()[0], model.observer()[0])
 
 
+def test_a_model_file_names_its_target_unless_it_is_the_tower(tmp_path):
+    model = SceneNet(["cylinder"])
+    texts = {}
+    for target in ("tower", "wire", "lamp=14,16"):
+        path = tmp_path / f"{target}.json"
+        write_model(path, model, CARD.model_copy(update={"target": target}))
+        texts[target] = json.loads(path.read_text())
+        assert read_model(path)[1].target == target
+    assert "target" not in texts["tower"]  # as in files of earlier versions
+    assert texts["wire"] == texts["tower"] | {"target": "wire"}
+
+
+def test_a_model_file_with_an_unknown_target_is_refused(tmp_path):
+    path = tmp_path / "m.json"
+    write_model(path, SceneNet(["cylinder"]), CARD)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {"target": "wires"}))
+    with pytest.raises(InputError, match="there is no target 'wires'"):
+        read_model(path)
+
+
 def test_the_file_of_a_scene_net_is_readable(written):
     model, path = written
     data = json.loads(path.read_text())

@@ -19,6 +19,7 @@ from scenenet.cli.options import (
     Resolution,
     cube,
     detection_settings,
+    target_of,
 )
 from scenenet.cli.output import score_lines, show
 
@@ -51,6 +52,14 @@ def command(
             "given against the labels and against the truth."
         ),
     ] = None,
+    target: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TARGET",
+            help="What the model finds, with its class codes in these files, such as wire=14. "
+            "[default: the target of the model]",
+        ),
+    ] = None,
     min_conductor: MinConductor = None,
     as_json: AsJson = False,
 ) -> None:
@@ -61,11 +70,13 @@ def command(
     A predicted tower within 5 m of a labelled one is a true positive.
 
     The point scores compare the points to which scenenet predict gives a tower id with the points
-    labelled tower: all points of each file, whatever --fit is.
+    labelled tower: all points of each file, whatever --fit is. For a model of another target they
+    compare the points in voxels at or above tau with the points labelled with the target, and there
+    are no tower scores.
 
     The exit code is 1 if a file fails; the other files are still scored.
     """
-    from scenenet.cli.labelled_files import evaluate_files
+    from scenenet.cli.scored_files import evaluate_files
 
     truths = truth or []
     if truths and len(truths) != len(labelled):
@@ -73,10 +84,11 @@ def command(
             f"{len(truths)} for {len(labelled)} labelled files; give one for each, in their order",
             param_hint="--truth",
         )
+    finds = None if target is None else target_of(target)
     grid = cube(resolution) if fit.value == "cube" else None
     detection = detection_settings(min_conductor)
     failures = Failures()
-    result = evaluate_files(labelled, model, codes.value, grid, detection, failures, truths)
+    result = evaluate_files(labelled, model, codes.value, grid, detection, failures, truths, finds)
     for skipped in result["skipped"]:
         print(f"not scored: {skipped['sample']}: {skipped['reason']}", file=sys.stderr)
     show(result, as_json, score_lines)

@@ -18,14 +18,20 @@ from scenenet.cli.options import (
     Protocols,
     Resolution,
     cube,
+    metric,
+    target_of,
 )
 from scenenet.cli.output import show, training_lines
+from scenenet.dataset.square_settings import SquareSettings
+from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL
 from scenenet.models.settings import LARGEST_RATE, THESIS_GENEOS
+from scenenet.pointcloud.targets import ROLES, TOWER
 from scenenet.training import presets
 
 EXAMPLES = (
     "scenenet train line.laz --codes edp --out model.json",
     "scenenet train crops/ --codes edp --kind cnn --out cnn.safetensors",
+    "scenenet train crops/ --codes edp --target wire --voxel-size 0.5 --out wire.json",
 )
 
 Out = Annotated[
@@ -69,6 +75,31 @@ Geneos = Annotated[
         f"{','.join(THESIS_GENEOS)}]",
     ),
 ]
+TargetOption = Annotated[
+    str,
+    typer.Option(
+        "--target",
+        metavar="TARGET",
+        help=f"What the model finds: {', '.join(ROLES)}, or class codes of the scheme, such as "
+        "14,16, with a name: lamp=14,16.",
+    ),
+]
+VoxelSize = Annotated[
+    float | None,
+    typer.Option(
+        min=SMALLEST_VOXEL,
+        max=LARGEST_VOXEL,
+        help="Edge of a voxel in m, the same in every crop, instead of --resolution.",
+    ),
+]
+Square = Annotated[
+    float,
+    typer.Option(
+        min=1,
+        max=1e4,
+        help="Edge in m of the squares that surveys are cut into for another target than towers.",
+    ),
+]
 Validation = Annotated[
     float | None,
     typer.Option(
@@ -81,6 +112,7 @@ Validation = Annotated[
 ]
 
 DEFAULT_KIND = Kinds("scenenet")
+DEFAULT_SQUARE = SquareSettings().edge
 DEFAULT_PROTOCOL = Protocols("operational")
 
 
@@ -95,13 +127,17 @@ def command(
     learning_rate: LearningRate = None,
     geneos: Geneos = None,
     resolution: Resolution = 64,
+    target: TargetOption = TOWER.text,
+    voxel_size: VoxelSize = None,
+    square: Square = DEFAULT_SQUARE,
     validation: Validation = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Train a model on labelled surveys or crops.
 
-    Surveys are cut into crops around their labelled towers.
+    Surveys are cut into crops around their labelled towers, or, for another --target, into squares
+    that hold a point labelled with it.
 
     Each seed gives a model. Its threshold tau is chosen by F0.5, and the model with the best F0.5
     is written to --out. A file that exists is replaced only if it is a model.
@@ -111,9 +147,10 @@ def command(
     ending = ".json" if kind.value == "scenenet" else ".safetensors"
     if out.suffix != ending:
         raise typer.BadParameter(f"a {kind} is written to a {ending} file", param_hint="--out")
+    finds = target_of(target)
     try:
         names = None if geneos is None else [name.strip() for name in geneos.split(",")]
-        settings = presets.preset(kind.value, protocol.value, epochs, learning_rate, names)
+        settings = presets.preset(kind.value, protocol.value, epochs, learning_rate, names, finds)
     except ValidationError as error:
         message = error.errors()[0]["msg"].removeprefix("Value error, ")
         raise typer.BadParameter(message, param_hint="--geneos") from None
@@ -135,7 +172,7 @@ def command(
     result = train_files(
         labelled,
         codes.value,
-        cube(resolution),
+        cube(resolution) if voxel_size is None else metric(voxel_size),
         settings,
         presets.TUNING,
         range(seeds),
@@ -147,6 +184,7 @@ def command(
         },
         out,
         failures,
+        SquareSettings(edge=square),
     )
     show(result, as_json, training_lines)
     failures.end()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenenet.pointcloud.class_schemes import ClassScheme, misfit
+from scenenet.pointcloud.targets import TOWER, Target
 
 FLAG_BITS = 0x1F
 MANY_CODES = 8
@@ -19,13 +20,17 @@ def in_words(n: int) -> str:
     return "1 point" if n == 1 else f"{n} points"
 
 
-def code_findings(counts: np.ndarray, scheme: ClassScheme, form: str) -> list[tuple[str, str]]:
+def code_findings(
+    counts: np.ndarray, scheme: ClassScheme, form: str, target: Target = TOWER
+) -> list[tuple[str, str]]:
     """(kind, text) of what is odd about the codes of a survey.
 
     Args:
         counts: (256,) points of each code.
         scheme: what the user says that the codes mean.
         form: format of the file.
+        target: what the labels are used for. Only for towers a survey without any is odd here; what
+            cuts crops for another target reports a file without it.
     """
     findings = []
     found = np.flatnonzero(counts).tolist()
@@ -42,7 +47,7 @@ def code_findings(counts: np.ndarray, scheme: ClassScheme, form: str) -> list[tu
         findings.append(("undefined", text))
     if wrong := misfit(scheme, counts):
         findings.append(("scheme", wrong))
-    if not any(counts[code] for code in scheme.tower):
+    if target.is_tower and not any(counts[code] for code in scheme.tower):
         tower = ", ".join(map(str, sorted(scheme.tower)))
         text = (
             f"no point is labelled tower (code {tower} in {scheme.name}): the survey can be "

@@ -19,6 +19,7 @@ from scenenet.pointcloud.quality.map_scale import map_findings
 from scenenet.pointcloud.quality.relief import Relief
 from scenenet.pointcloud.quality.steps import CoordinateSteps
 from scenenet.pointcloud.reading import SurveyInfo, iter_chunks, survey_info
+from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.pointcloud.ts40k import sample_files
 from scenenet.pointcloud.units import NotMetres, not_metres
 
@@ -50,7 +51,12 @@ class Screening:
     """What looks wrong about a survey, from its header and its points."""
 
     def __init__(
-        self, info: SurveyInfo, scheme: ClassScheme | None = None, *, converted: bool = False
+        self,
+        info: SurveyInfo,
+        scheme: ClassScheme | None = None,
+        *,
+        converted: bool = False,
+        target: Target = TOWER,
     ) -> None:
         """No point is counted yet.
 
@@ -58,8 +64,9 @@ class Screening:
             info: the header of the survey.
             scheme: what its class codes mean; None if they are not used.
             converted: whether the command converts other units of length.
+            target: what the class codes are used for.
         """
-        self.info = info
+        self.info, self._target = info, target
         self._converted = converted
         self._sizes = np.array(info.unit_sizes if converted else (1.0, 1.0, 1.0))
         self.scheme = scheme
@@ -127,8 +134,8 @@ class Screening:
         # Coordinates that are no metres have no density.
         found += relief or [Finding(*each) for each in self._density.findings(self.n_points)]
         if self.scheme is not None:
-            form = self.info.format
-            found += [Finding(*each) for each in code_findings(self.counts, self.scheme, form)]
+            codes = self.counts, self.scheme, self.info.format, self._target
+            found += [Finding(*each) for each in code_findings(*codes)]
         return found
 
     def stray(self) -> list[Finding]:
@@ -158,12 +165,15 @@ class Screening:
         return tuple(finding.text for finding in [*self.findings(), *self.stray()])
 
 
-def survey_warnings(path: str | Path, codes: str | None = None) -> tuple[str, ...]:
+def survey_warnings(
+    path: str | Path, codes: str | None = None, target: Target = TOWER
+) -> tuple[str, ...]:
     """What looks wrong about a survey, a TS40K sample or a folder of them, in a pass of its own.
 
     Args:
         path: LAS, LAZ, COPC, .npy or .pt file, or a folder of samples.
         codes: class scheme; None if the class codes are not used.
+        target: what the class codes are used for.
 
     Raises:
         InputError: the survey cannot be read.
@@ -171,15 +181,18 @@ def survey_warnings(path: str | Path, codes: str | None = None) -> tuple[str, ..
     path = Path(path)
     scheme = None if codes is None else class_scheme(codes)
     if not path.is_dir():
-        return _screened(path, scheme).warnings()
-    samples = {sample.name: _screened(sample, scheme) for sample in sample_files(path)}
+        return _screened(path, scheme, target).warnings()
+    samples = {sample.name: _screened(sample, scheme, target) for sample in sample_files(path)}
     counts = sum((one.counts for one in samples.values()), np.zeros(256, np.int64))
     each = {name: [*one.findings(), *one.stray()] for name, one in samples.items()}
-    return tuple(of_samples(each, counts, scheme))
+    return tuple(of_samples(each, counts, scheme, target))
 
 
 def of_samples(
-    each: Mapping[str, Sequence[Finding]], counts: np.ndarray, scheme: ClassScheme | None
+    each: Mapping[str, Sequence[Finding]],
+    counts: np.ndarray,
+    scheme: ClassScheme | None,
+    target: Target = TOWER,
 ) -> list[str]:
     """The findings of the samples of a folder: one sentence for each kind.
 
@@ -188,6 +201,7 @@ def of_samples(
         counts: (256,) points of each code in all samples together: one sample alone says little
             about the codes.
         scheme: what the codes mean; None if they are not used.
+        target: what they are used for.
     """
     texts = []
     kinds = dict.fromkeys(f.kind for findings in each.values() for f in findings)
@@ -200,12 +214,12 @@ def of_samples(
         texts.append(f"{text} ({name}{more})" if len(each) > 1 else text)
     if scheme is not None:
         form = Path(next(iter(each))).suffix.removeprefix(".")
-        texts += [text for _, text in code_findings(counts, scheme, form)]
+        texts += [text for _, text in code_findings(counts, scheme, form, target)]
     return texts
 
 
-def _screened(path: Path, scheme: ClassScheme | None) -> Screening:
-    screening = Screening(survey_info(path), scheme)
+def _screened(path: Path, scheme: ClassScheme | None, target: Target) -> Screening:
+    screening = Screening(survey_info(path), scheme, target=target)
     for chunk in iter_chunks(path):
         screening.add(chunk.xyz, chunk.classification)
     return screening

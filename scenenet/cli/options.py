@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 
 from scenenet.core.errors import InputError
+from scenenet.core.provided_kernels import VARIABLE, provide
 from scenenet.dataset import voxels
 from scenenet.models import settings
 from scenenet.models.packaged import packaged_model
@@ -58,6 +59,24 @@ Surveys = Annotated[
         "(.npy, .pt)."
     ),
 ]
+
+
+def _provide(files: list[Path] | None) -> list[Path] | None:
+    provide(files or ())
+    return files
+
+
+Kernels = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--kernels",
+        metavar="FILE",
+        callback=_provide,
+        help="Python file with a kernel, or a folder of them. It is run when a kernel of its name "
+        f"is used. May be repeated; {VARIABLE} adds more, separated as in PATH.",
+    ),
+]
+"""Files with kernels, which are known once the option is read."""
 Labelled = Annotated[
     list[Path],
     typer.Argument(

@@ -14,8 +14,9 @@ from typing import Annotated, Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenenet.config.errors import explain
-from scenenet.core.errors import InputError
+from scenenet.core.errors import InputError, in_file
 from scenenet.core.provenance import FULL_BELOW_BYTES
+from scenenet.core.provided_kernels import provide, source_named
 from scenenet.core.settings import NAME, PathText, Settings
 from scenenet.dataset.crops import CropSettings
 from scenenet.dataset.labelled_towers import TowerSettings
@@ -110,6 +111,11 @@ class Config(Settings):
     towers: TowerSettings = TowerSettings()
     crops: CropSettings = CropSettings()
     voxels: VoxelSettings = VoxelSettings()
+    kernels: tuple[PathText, ...] = Field(
+        (),
+        description="Python files with kernels from outside the package, or folders of them; a "
+        "kernel has the name of its file, and its code runs",
+    )
     split: SplitSettings = SplitSettings()
     training: TrainingSettings = Field(
         TrainingSettings(), description="training settings of every model that does not set its own"
@@ -267,6 +273,17 @@ class Config(Settings):
             if model.kind == "scenenet"
         )
 
+    def outside_kernels(self) -> dict[str, dict[str, str]]:
+        """What identifies each kernel from outside the package that the models and the studies
+        name (``KernelSource.record``), by name.
+
+        Raises:
+            InputError: a kernel cannot be read, or there are several of its name.
+        """
+        named = geneos_in(self.model_dump(include={"models", "studies"}))
+        sources = {name: source_named(name) for name in sorted(named)}
+        return {name: source.record() for name, source in sources.items() if source}
+
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)
 
@@ -296,8 +313,30 @@ def _with_values(study: Any, values: Mapping[str, Any]) -> Any:
     return replaced
 
 
+def geneos_in(settings: Any) -> set[str]:
+    """The names of kernels anywhere in settings, also in the changes of studies by dotted name."""
+    if isinstance(settings, list | tuple):
+        return set().union(*map(geneos_in, settings))
+    if not isinstance(settings, Mapping):
+        return set()
+    found: set[str] = set()
+    for key, value in settings.items():
+        named = str(key).rpartition(".")[2] == "geneos"
+        found |= _texts(value) if named else geneos_in(value)
+    return found
+
+
+def _texts(value: Any) -> set[str]:
+    if isinstance(value, list | tuple):
+        return set().union(*map(_texts, value))
+    return {value} if isinstance(value, str) else set()
+
+
 def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
     """Validate a configuration and fill in the defaults.
+
+    The files in ``kernels`` are provided to this process and those it starts, because models name
+    their kernels.
 
     Args:
         raw: as read from YAML.
@@ -306,6 +345,10 @@ def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
     Raises:
         InputError: names every wrong key, the problem, and a correct line.
     """
+    kernels = raw.get("kernels")
+    if isinstance(kernels, list | tuple) and all(isinstance(path, str) for path in kernels):
+        with in_file(file or "configuration", "kernels"):
+            provide(kernels)
     try:
         return Config.model_validate(dict(raw))
     except ValidationError as error:

@@ -1,13 +1,15 @@
-"""All kernels, by name."""
+"""All kernels, by name: those of the package, and those that the user provides."""
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import pkgutil
 from functools import cache
 
 from scenenet.core.errors import InputError
-from scenenet.geneo import kernels
+from scenenet.core.provided_kernels import VARIABLE, provided, source_named
+from scenenet.geneo import kernels, outside
 from scenenet.geneo.kernel import GeneoKernel
 
 _KERNELS: dict[str, GeneoKernel] = {}
@@ -16,9 +18,14 @@ _KERNELS: dict[str, GeneoKernel] = {}
 def register(kernel: type[GeneoKernel]) -> type[GeneoKernel]:
     """Class decorator: register ``kernel`` under its ``name``.
 
+    A class in a kernel file from outside the package is kept for ``scenenet.geneo.outside``.
+
     Raises:
         ValueError: another class has this name.
     """
+    if (registered := outside.REGISTERED.get()) is not None:
+        registered.append(kernel)
+        return kernel
     known = _KERNELS.get(kernel.name)
     if known is not None and type(known).__qualname__ != kernel.__qualname__:
         raise ValueError(f"two kernels are called {kernel.name!r}: {type(known)} and {kernel}")
@@ -34,22 +41,38 @@ def _discover() -> None:
 
 
 def kernel_names() -> list[str]:
-    """The names of all kernels, in alphabetical order."""
+    """The names of all kernels, in alphabetical order. No code from outside the package is run.
+
+    Raises:
+        InputError: a file that the user provides cannot be a kernel.
+    """
     _discover()
-    return sorted(_KERNELS)
+    return sorted({*_KERNELS, *provided()})
+
+
+def is_registered(name: str) -> bool:
+    """Whether a kernel of the package, or one that this process has registered, has this name."""
+    _discover()
+    return name in _KERNELS
 
 
 def kernel_named(name: str) -> GeneoKernel:
-    """The kernel called ``name``.
+    """The kernel called ``name``; the code of a provided kernel is run when it is first asked for.
 
     Raises:
-        InputError: there is none; the message lists the known names.
+        InputError: there is none; the message lists the known names. Or the user provides a file
+            that fails.
     """
     _discover()
-    try:
+    if name in _KERNELS:
         return _KERNELS[name]
-    except KeyError:
-        raise InputError(
-            f"unknown GENEO kernel {name!r}",
-            remedy=f"Name one of: {', '.join(kernel_names())}",
-        ) from None
+    if (source := source_named(name)) is not None:
+        return outside.load(source)
+    names = kernel_names()
+    close = difflib.get_close_matches(name, names, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    raise InputError(
+        f"unknown GENEO kernel {name!r}{hint}",
+        remedy=f"Name one of: {', '.join(names)}, or provide its file with --kernels or in "
+        f"{VARIABLE}",
+    )

@@ -27,6 +27,7 @@ from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
 from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.kernel_records import KernelMissing, record_of, require_kernels
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import LARGEST_KERNEL, KernelSize, MetricSettings, TargetText
@@ -134,6 +135,7 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
     Raises:
         InputError: the file does not exist, this version cannot read it, or a number in it is
             not finite or out of bounds.
+        KernelMissing: a kernel from outside the package is not provided, or is another one.
     """
     path = Path(path)
     if not path.is_file():
@@ -143,7 +145,9 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
             return _read_cnn(path)
         return _read_scenenet(json.loads(path.read_text(encoding="utf-8")))
     except InputError as error:
-        raise InputError(error.problem, file=path, remedy=error.remedy) from None
+        if error.file is not None:  # of a kernel file
+            raise
+        raise type(error)(error.problem, file=path, remedy=error.remedy) from None
     except ValidationError as error:
         fault = error.errors()[0]
         key = ".".join(map(str, fault["loc"]))
@@ -161,9 +165,11 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
 
 
 def is_model_file(path: str | Path) -> bool:
-    """Whether the file is a model that this version can read."""
+    """Whether the file is a model that this version can read, given its kernels."""
     try:
         read_model(path)
+    except KernelMissing:
+        return True
     except InputError:
         return False
     return True
@@ -182,7 +188,8 @@ def _numbers(model: GeneoModel) -> dict[str, Any]:
             }
             for p in kernel_named(geneo).parameters
         }
-        geneos.append({"name": name, "kernel": geneo, "parameters": parameters})
+        entry = {"name": name, "kernel": geneo, **record_of(geneo), "parameters": parameters}
+        geneos.append(entry)
     mixing = {name: values[f"lambda.{name}"] for name in model.names}
     lengths: dict[str, Any] = {}
     if isinstance(model, MetricSceneNet):
@@ -194,6 +201,7 @@ def _numbers(model: GeneoModel) -> dict[str, Any]:
 
 def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
     _check_head(data)
+    require_kernels(data["geneos"])
     geneos = [entry["kernel"] for entry in data["geneos"]]
     version = data["format_version"]
     model: GeneoModel

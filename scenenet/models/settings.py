@@ -9,7 +9,6 @@ from __future__ import annotations
 import difflib
 import sys
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
@@ -20,7 +19,7 @@ from pydantic import (
     model_validator,
 )
 
-import scenenet
+from scenenet.core.provided_kernels import known_kernels
 from scenenet.core.settings import Settings
 from scenenet.dataset.voxels import Measurement
 from scenenet.pointcloud.targets import ROLES, TOWER, Target, canonical
@@ -53,10 +52,9 @@ def _known_kernel(name: str) -> str:
     """Refuse the name of a GENEO kernel that there is none of.
 
     A kernel has the name of its file. The files are listed and not imported, because that would
-    load torch; kernels of other packages are known once the registry is loaded.
+    load torch; kernels that this process has registered are known once the registry is loaded.
     """
-    files = Path(scenenet.__path__[0], "geneo", "kernels").glob("[!_]*.py")
-    known = {file.stem for file in files}
+    known = known_kernels()
     if registry := sys.modules.get("scenenet.geneo.registry"):
         known |= set(registry.kernel_names())
     if name not in known:

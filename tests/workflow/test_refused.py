@@ -41,6 +41,12 @@ def test_all_problems_of_the_sheet(project):
     assert "line 6: data/onw.laz is not there, did you mean data/own.laz?" in message
 
 
+def test_a_kernel_file_that_is_missing(project):
+    project.configure({"kernels": ["data/lamp.py"]})
+    message = short(project.refused())
+    assert "data/lamp.py: kernels: there is no such kernel file" in message
+
+
 def test_nothing_to_learn_from(project):
     sheet = project.folder / "config/surveys.tsv"
     sheet.write_text("".join(sheet.read_text().splitlines(keepends=True)[i] for i in (0, 3)))

@@ -58,6 +58,22 @@ SETTINGS = {"resolved_config": 1}
 """The resolved configuration is written after each change of a setting."""
 
 
+RING = """\
+from scenenet.geneo import GeneoKernel, ShapeParameter, register, zero_sum
+from scenenet.geneo.kernel import gaussian_shell
+
+
+@register
+class Ring(GeneoKernel):
+    name = "ring"
+    parameters = (ShapeParameter("r", 0.5, 3.0, "voxel", "radius of the ring"),)
+
+    def sample(self, lattice, shape):
+        ring = gaussian_shell(lattice.planar_squared, shape["r"] ** 2, shape["r"])
+        return zero_sum(ring.expand(lattice.size), lattice.inside)
+"""
+"""A kernel file of a user."""
+
 MISSING = re.compile(r"Missing output files: ([^;\n]+)")
 
 # Surveys
@@ -247,6 +263,21 @@ def test_a_new_kernel_trains_again(project):
     (kernels / "cone.py").write_text("# to come\nNOTHING = 0\n")
     drawn = {"tower_map": 2, "survey_map": 2, "dataset_tables": 1}
     assert project.planned() == {**LEARNED, **BOTH, **drawn}
+
+
+def test_editing_a_kernel_from_outside_trains_its_models_again(project):
+    ring = project.folder / "data/ring.py"
+    ring.write_text(RING)
+    model = {"name": "rings", "kind": "scenenet", "geneos": ["cylinder", "ring"]}
+    models = [{"name": n, "kind": n} for n in ("scenenet", "cnn")]
+    project.configure({"kernels": ["data/ring.py"], "models": [*models, model]})
+    others, own = (f"results/train/{name}/seed-0/model.json" for name in ("scenenet", "rings"))
+    assert project.planned(others) == {}
+    project.run(own)
+    assert '"file": "ring.py"' in (project.folder / own).read_text()
+    assert project.planned(own, others) == {}
+    ring.write_text(f"{RING}# another digest\n")
+    assert project.planned(own, others) == {"train_scenenet": 1}
 
 
 def test_editing_the_report_writes_the_report_again(project):

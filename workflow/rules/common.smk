@@ -14,7 +14,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
 from scenenet.core.code_hash import code_hash
-from scenenet.config.schema import load, merged
+from scenenet.config.schema import geneos_in, load, merged
 from scenenet.core.errors import InputError
 from scenenet.figures import CROP_RANKS
 from scenenet.core.files import digest
@@ -72,11 +72,19 @@ def code_of(script):
     return code_hash([WORKFLOW / "scripts" / f"{script}.py"])
 
 
+def kernels_of(identity):
+    """What identifies the kernels from outside the package that the settings of a job name. Jobs
+    that read a model run after its training, so its kernels are not among their parameters."""
+    named = {name: KERNELS[name] for name in geneos_in(identity) if name in KERNELS}
+    return {"kernels": named} if named else {}
+
+
 def job(stage, settings, **identity):
     """The parameter of a job: all that decides on its result besides the files that other jobs
     made. It is one dict, sorted and of plain values, because Snakemake compares the parameters of a
     rule as a set, in which two that are swapped look the same."""
     parts = {"stage": stage, "settings": settings, "code": code_of(stage), **identity}
+    parts |= kernels_of([settings, identity])
     return json.loads(json.dumps(parts, sort_keys=True))
 
 
@@ -187,6 +195,7 @@ try:
     SURVEYS = {survey.name: survey for survey in read_surveys(settings, warn=warn_once)}
     THESIS = {"thesis": fingerprint(own_file(settings.thesis))}
     PLANS = plans_of_tiles()
+    KERNELS = settings.outside_kernels()
 except InputError as error:
     raise WorkflowError(str(error)) from None
 

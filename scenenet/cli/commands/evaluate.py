@@ -12,6 +12,7 @@ from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
     Fits,
+    Kernels,
     LabelCodes,
     Labelled,
     MinConductor,
@@ -61,6 +62,7 @@ def command(
         ),
     ] = None,
     min_conductor: MinConductor = None,
+    kernels: Kernels = None,
     as_json: AsJson = False,
 ) -> None:
     """Score a model on labelled surveys or crops.

@@ -10,6 +10,7 @@ import typer
 
 from scenenet.cli.options import (
     AsJson,
+    Kernels,
     MinConductor,
     ModelFile,
     Overwrite,
@@ -28,6 +29,7 @@ def command(
     model: ModelFile,
     out: Annotated[Path, typer.Option("--out", help="Page to write (.html).")],
     min_conductor: MinConductor = None,
+    kernels: Kernels = None,
     crs: System = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,

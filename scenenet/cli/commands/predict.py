@@ -10,6 +10,7 @@ import typer
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
+    Kernels,
     MinConductor,
     ModelFile,
     Overwrite,
@@ -38,6 +39,7 @@ def command(
         ),
     ] = None,
     min_conductor: MinConductor = None,
+    kernels: Kernels = None,
     crs: System = None,
     classify: Annotated[
         bool,

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
+    Kernels,
     Kinds,
     LabelCodes,
     Labelled,
@@ -126,6 +127,7 @@ def command(
     epochs: Epochs = None,
     learning_rate: LearningRate = None,
     geneos: Geneos = None,
+    kernels: Kernels = None,
     resolution: Resolution = 64,
     target: TargetOption = TOWER.text,
     voxel_size: VoxelSize = None,

@@ -1,0 +1,253 @@
+"""Kernels from outside the package: found by name, run only when they are used, never silently."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from scenenet.core import provided_kernels
+from scenenet.core.errors import InputError
+from scenenet.core.provided_kernels import (
+    VARIABLE,
+    faults,
+    known_kernels,
+    name_fault,
+    provide,
+    provided,
+)
+from scenenet.geneo import kernel_named, kernel_names
+from scenenet.models.kernel_records import KernelMissing
+from scenenet.models.model_file import ModelCard, is_model_file, read_model, write_model
+from scenenet.models.scenenet import SceneNet
+from scenenet.models.settings import ModelSettings
+
+RING = """\
+from scenenet.geneo import GeneoKernel, ShapeParameter, register, zero_sum
+from scenenet.geneo.kernel import gaussian_shell
+
+
+@register
+class Ring(GeneoKernel):
+    name = "ring"
+    parameters = (ShapeParameter("r", 0.5, 3.0, "voxel", "radius of the ring"),)
+
+    def sample(self, lattice, shape):
+        ring = gaussian_shell(lattice.planar_squared, shape["r"] ** 2, shape["r"])
+        return zero_sum(ring.expand(lattice.size), lattice.inside)
+"""
+
+BALANCED = "zero_sum(ring.expand(lattice.size), lattice.inside)"
+"""What the ring returns."""
+
+CARD = ModelCard(
+    name="rings", codes="edp", measurement="presence", fit="cube", resolution=64, voxel_size=1.0
+)
+
+
+@pytest.fixture(autouse=True)
+def nothing_provided(monkeypatch):
+    """Each test provides its own kernels."""
+    monkeypatch.setenv(VARIABLE, "")
+    provided_kernels._provided.cache_clear()
+    yield
+    provided_kernels._provided.cache_clear()
+
+
+@pytest.fixture
+def ring(tmp_path):
+    path = tmp_path / "ring.py"
+    path.write_text(RING)
+    return path
+
+
+def test_a_provided_kernel_trains_like_any_other(ring):
+    provide([ring])
+    assert "ring" in kernel_names()
+    assert ModelSettings(name="m", kind="scenenet", geneos=["cylinder", "ring"]).geneos[1] == "ring"
+    model = SceneNet(["cylinder", "ring"], (5, 5, 5))
+    model.kernels()[1].square().sum().backward()
+    assert float(model.shapes["ring"]["r"].grad) != 0
+
+
+def test_the_variable_names_files_and_folders(ring, tmp_path, monkeypatch):
+    folder = tmp_path / "more"
+    folder.mkdir()
+    (folder / "halo.py").write_text(RING.replace('"ring"', '"halo"'))
+    (folder / "test_halo.py").write_text("raise AssertionError('a test is no kernel')")
+    monkeypatch.setenv(VARIABLE, f"{ring}{os.pathsep}{folder}")
+    assert set(provided()) == {"ring", "halo"}
+    assert kernel_named("halo").name == "halo"
+
+
+def test_the_names_of_kernels_are_known_without_running_them_and_without_torch(tmp_path):
+    path = tmp_path / "broken.py"
+    path.write_text("raise RuntimeError('this must not run')")
+    code = (
+        "import sys\n"
+        "from scenenet.models.settings import ModelSettings\n"
+        "ModelSettings(name='m', kind='scenenet', geneos=['broken'])\n"
+        "assert 'torch' not in sys.modules\n"
+    )
+    environment = {**os.environ, VARIABLE: str(path)}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1\n", r"ring\.py: the file registers no kernel\. Decorate"),
+        ("x = 1\ny = z\n", r"ring\.py: line 2: .*fails with NameError: name 'z' is not defined"),
+        ("x = (\n", r"ring\.py: line 1: .*fails with SyntaxError"),
+        ("import sys\nsys.exit(3)\n", r"ring\.py: line 2: .*SystemExit: 3"),
+        (RING.replace('"ring"', '"other"'), r"registers 'other', and a kernel has the name of its"),
+        (RING + RING.replace('"ring"', '"second"'), "registers 'ring', 'second'"),
+        (RING.replace('"voxel"', '"foot"'), "has r in 'foot', which is none of"),
+        (RING.replace("0.5, 3.0", "3.0, 0.5"), "has r from 3 to 0.5, which is no range"),
+        (RING.replace(BALANCED, "ring.sum()"), r"gives \(\) for a lattice of \(7, 5, 5\)"),
+        (RING.replace('shape["r"] ** 2,', 'shape["s"],'), r"line 11: .*KeyError: 's'"),
+        (RING.replace(BALANCED, f'{BALANCED} * float("nan")'), "not finite for r = 1.22"),
+        (RING.replace(BALANCED, f"{BALANCED}.double()"), r"gives values of torch\.float64"),
+        (RING.replace("(Shape", "Shape").replace('"),)', '")'), "must have parameters, a tuple"),
+        (RING.replace("    def sample", "    def simple"), "TypeError: Can't instantiate"),
+        (RING.replace(BALANCED, f"{BALANCED}.detach()"), "cannot be differentiated"),
+    ],
+)  # fmt: skip
+def test_a_faulty_file_is_named_with_the_place(tmp_path, text, message):
+    path = tmp_path / "ring.py"
+    path.write_text(text)
+    provide([path])
+    with pytest.raises(InputError, match=message) as raised:
+        kernel_named("ring")
+    assert str(path) in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("Ring.py", "which must have small letters"),
+        ("arrow_2.py", "must not end in a number"),
+        ("cylinder.py", "a kernel of the package is called 'cylinder' as well"),
+        ("ring.txt", r"not a Python file"),
+    ],
+)
+def test_a_name_that_no_kernel_can_have_is_refused_at_once(tmp_path, name, message):
+    path = tmp_path / name
+    path.write_text(RING)
+    with pytest.raises(InputError, match=message):
+        provide([path])
+
+
+def test_paths_without_a_kernel_are_refused(tmp_path):
+    with pytest.raises(InputError, match="there is no such kernel file"):
+        provide([tmp_path / "missing.py"])
+    with pytest.raises(InputError, match="the folder has no kernel file"):
+        provide([tmp_path])
+    assert name_fault("a" * 40) is not None
+
+
+def test_two_files_of_one_name_are_refused(ring, tmp_path):
+    (tmp_path / "b").mkdir()
+    other = tmp_path / "b" / "ring.py"
+    other.write_text(RING)
+    with pytest.raises(InputError, match=r"2 kernels are called 'ring': .*ring\.py and .*ring\.py"):
+        provide([ring, other])
+    provide([ring, tmp_path / "." / "ring.py"])  # the same file twice is one kernel
+
+
+def test_an_unknown_name_lists_the_known_ones_with_the_closest(ring):
+    provide([ring])
+    with pytest.raises(InputError, match=r"'rng'; did you mean 'ring'\?\. Name one of: arrow, "):
+        kernel_named("rng")
+
+
+@pytest.fixture
+def model(ring, tmp_path):
+    """A model file with a kernel that is no longer provided."""
+    provide([ring])
+    path = tmp_path / "model.json"
+    write_model(path, SceneNet(["cylinder", "ring"], (5, 5, 5)), CARD)
+    read_model(path)
+    provided_kernels._provided.cache_clear()
+    os.environ[VARIABLE] = ""
+    return path
+
+
+def test_a_model_file_never_finds_its_kernel_by_itself(model, monkeypatch):
+    monkeypatch.chdir(model.parent)  # where ring.py is
+    with pytest.raises(KernelMissing, match=r"needs the kernel 'ring' of the file ring\.py"):
+        read_model(model)
+    assert is_model_file(model)
+
+
+def test_another_kernel_of_the_name_is_refused_before_it_runs(model, tmp_path):
+    (tmp_path / "b").mkdir()
+    other = tmp_path / "b" / "ring.py"
+    other.write_text("raise RuntimeError('this must not run')")
+    provide([other])
+    with pytest.raises(KernelMissing, match=r"and .*ring\.py is another one"):
+        read_model(model)
+
+
+def test_a_model_file_without_the_digest_is_refused(model, ring):
+    import json
+
+    data = json.loads(model.read_text())
+    del data["geneos"][1]["source"]
+    model.write_text(json.dumps(data))
+    provide([ring])
+    with pytest.raises(KernelMissing, match="does not say which file its kernel 'ring' had"):
+        read_model(model)
+
+
+def test_built_in_kernels_leave_no_record(tmp_path):
+    write_model(tmp_path / "m.json", SceneNet(["cylinder"], (5, 5, 5)), CARD)
+    assert "source" not in (tmp_path / "m.json").read_text()
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """An installed package with a kernel, as pip leaves it on disk."""
+    site = tmp_path / "site"
+    (site / "rings").mkdir(parents=True)
+    (site / "rings" / "__init__.py").write_text("raise RuntimeError('not before it is used')")
+    (site / "rings" / "kernel.py").write_text(RING)
+    info = site / "rings-1.2.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: rings\nVersion: 1.2\n")
+    entries = "ring = rings.kernel:Ring\ncylinder = rings.kernel:Ring\nhalo = rings.kernel:Ring\n"
+    (info / "entry_points.txt").write_text(f"[scenenet.geneos]\n{entries}")
+    monkeypatch.syspath_prepend(site)
+    provided_kernels._provided.cache_clear()
+    yield site
+    for name in ("rings", "rings.kernel"):
+        sys.modules.pop(name, None)
+
+
+def test_an_installed_package_provides_a_kernel(package, tmp_path):
+    assert "ring" in known_kernels()
+    with pytest.raises(InputError, match=r"kernel\.py: .*RuntimeError: not before it is used"):
+        kernel_named("ring")
+    (package / "rings" / "__init__.py").write_text("")
+    path = tmp_path / "model.json"
+    write_model(path, SceneNet(["ring"], (5, 5, 5)), CARD)
+    assert '"distribution": "rings"' in path.read_text()
+    read_model(path)
+    with pytest.raises(InputError, match="'halo' refers to a kernel called 'ring'"):
+        kernel_named("halo")
+
+    found = [str(error) for error in faults(provided(), packages=True)]
+    assert found == [
+        "rings 1.2: a kernel of the package is called 'cylinder' as well. Give the file and its "
+        "kernel another name"
+    ]
+    assert type(kernel_named("cylinder")).__module__ == "scenenet.geneo.kernels.cylinder"
+    provide()  # a fault of a package that is not used stops nothing
+
+    metadata = package / "rings-1.2.dist-info" / "METADATA"
+    metadata.write_text(metadata.read_text().replace("1.2", "1.3"))
+    provided_kernels._provided.cache_clear()
+    with pytest.raises(KernelMissing, match=r"rings 1\.2 .*, and rings 1\.3 provides it now"):
+        read_model(path)

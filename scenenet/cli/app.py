@@ -7,12 +7,22 @@ message names the fault), 2 wrong usage.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import ModuleType
 from typing import Annotated
 
 import typer
 
-from scenenet.cli.commands import bench, check, evaluate, explain, predict, synth, train
+from scenenet.cli.commands import (
+    bench,
+    check,
+    evaluate,
+    explain,
+    geneo,
+    predict,
+    synth,
+    train,
+)
 from scenenet.core.errors import InputError
 from scenenet.core.interrupts import ENDING, end_cleanly_on_signals
 
@@ -33,9 +43,20 @@ app = typer.Typer(
     epilog="scenenet COMMAND --help explains a command, with examples.",
 )
 
-for name, module in COMMANDS.items():
-    heading = "Example:" if len(module.EXAMPLES) == 1 else "Examples:"
-    app.command(name, epilog="\n\n".join([heading, *module.EXAMPLES]))(module.command)
+
+def _add(group: typer.Typer, commands: Mapping[str, ModuleType]) -> None:
+    for name, module in commands.items():
+        heading = "Example:" if len(module.EXAMPLES) == 1 else "Examples:"
+        epilog = "\n\n".join([heading, *module.EXAMPLES])
+        group.command(name, epilog=epilog)(module.command)
+
+
+_add(app, COMMANDS)
+workbench = typer.Typer(
+    no_args_is_help=True, rich_markup_mode=None, help=geneo.HELP, epilog=geneo.EPILOG
+)
+_add(workbench, geneo.COMMANDS)
+app.add_typer(workbench, name="geneo")
 
 
 def _print_version(wanted: bool) -> None:

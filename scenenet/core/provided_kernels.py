@@ -118,6 +118,17 @@ def source_named(name: str) -> KernelSource | None:
     return found[0] if found else None
 
 
+def source_of_file(path: str | Path) -> KernelSource:
+    """The kernel in a file, whether it is provided or not.
+
+    Raises:
+        InputError: the file is missing, or cannot be a kernel.
+    """
+    if Path(path).is_dir():
+        raise InputError("this is a folder, not a kernel file", file=path)
+    return _of_file(_files(Path(path))[0])
+
+
 def provide(paths: Iterable[str | Path] = ()) -> None:
     """Add files and folders to those in ``VARIABLE``, for this process and those it starts.
 

@@ -1,6 +1,7 @@
 """Group-equivariant non-expansive operators: kernels that encode prior knowledge (thesis 4.4)."""
 
 from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter, zero_sum
+from scenenet.geneo.outside import kernel_of_file
 from scenenet.geneo.registry import kernel_named, kernel_names, register
 
 __all__ = [
@@ -9,6 +10,7 @@ __all__ = [
     "ShapeParameter",
     "kernel_named",
     "kernel_names",
+    "kernel_of_file",
     "register",
     "zero_sum",
 ]

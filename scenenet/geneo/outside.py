@@ -19,7 +19,7 @@ from types import ModuleType
 import torch
 
 from scenenet.core.errors import InputError
-from scenenet.core.provided_kernels import KernelSource
+from scenenet.core.provided_kernels import KernelSource, source_of_file
 from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter
 
 REGISTERED: ContextVar[list[type[GeneoKernel]] | None] = ContextVar("registered", default=None)
@@ -28,6 +28,15 @@ REGISTERED: ContextVar[list[type[GeneoKernel]] | None] = ContextVar("registered"
 _UNITS = ("voxel", "voxel^2", "1")
 _SIZE = (7, 5, 5)
 """Voxels (z, y, x) in which a kernel is tried."""
+
+
+def kernel_of_file(path: str | Path) -> GeneoKernel:
+    """The kernel in a file, without providing it to anything else, for its tests.
+
+    Raises:
+        InputError: as ``load``, or the file cannot be a kernel.
+    """
+    return load(source_of_file(path))
 
 
 @cache

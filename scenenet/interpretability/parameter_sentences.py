@@ -68,16 +68,17 @@ def sentences(
         kernel = kernel_named(geneo)
         numbers = {p.name: values[f"{name}.{p.name}"] for p in kernel.parameters}
         for parameter in kernel.parameters:
-            if parameter.sentence is None:
-                text = _plain(parameter, numbers[parameter.name])
-            else:
-                text = parameter.sentence(numbers, reference or Reference())
+            text = sentence_of(parameter, numbers, reference or Reference())
             texts[f"{name}.{parameter.name}"] = text
     weights = {name: values[f"lambda.{name}"] for name in model.names}
     return texts | {f"lambda.{name}": _weight(name, weights) for name in weights}
 
 
-def _plain(parameter: ShapeParameter, value: float) -> str:
+def sentence_of(parameter: ShapeParameter, numbers: Numbers, reference: Reference) -> str:
+    """Describes a parameter of a kernel with these ``numbers``, in metres."""
+    if parameter.sentence is not None:
+        return parameter.sentence(numbers, reference)
+    value = numbers[parameter.name]
     unit = "" if parameter.metric_unit == "1" else f" {parameter.metric_unit}"
     return f"{parameter.meaning}: {value:.2f}{unit}"
 

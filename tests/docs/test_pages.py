@@ -85,15 +85,18 @@ def test_every_command_of_the_readme_exists(project_root):
 
 def test_every_option_in_an_example_is_one_of_its_command(project_root: Path):
     command = typer.main.get_command(app)
+    groups = {name: sub for name, sub in command.commands.items() if hasattr(sub, "commands")}
+    commands = {"": command, **command.commands}
+    for name, group in groups.items():
+        commands |= {f"{name} {part}": sub for part, sub in group.commands.items()}
     known = {
-        name: {option for p in sub.params for option in p.opts}
-        for name, sub in command.commands.items()
+        name: {option for p in sub.params for option in p.opts} for name, sub in commands.items()
     }
-    known[""] = {option for p in command.params for option in p.opts}
+    any_group = "|".join(groups)
     examples = 0
     for page in _pages(project_root):
         for line in _commands(page.read_text()):
-            call = re.match(r"scenenet (?:(\w+) )?(.*?)(?:#|$)", line)
+            call = re.match(rf"scenenet (?:((?:(?:{any_group}) )?\w+) )?(.*?)(?:#|$)", line)
             if call:
                 examples += 1
                 used = set(re.findall(r"(?<!\S)--[\w-]+", call[2]))

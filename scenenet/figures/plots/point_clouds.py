@@ -27,11 +27,13 @@ class View:
         title: above the panel.
         values: (N,) names of ``ROLE_COLOURS``, or (N,) float probabilities in [0, 1].
         kind: which of the two.
+        label: what the numbers are, beside their scale.
     """
 
     title: str
     values: np.ndarray
     kind: Literal["class", "probability"]
+    label: str = "probability"
 
 
 def side_views(xyz: np.ndarray, views: Sequence[View], out: str | Path) -> str:
@@ -50,7 +52,7 @@ def side_views(xyz: np.ndarray, views: Sequence[View], out: str | Path) -> str:
     figure, axes = new_figure(
         1, len(views), width=panel_width * len(views) + 1.6, height=panel_height + 1, sharey=True
     )
-    points = None
+    points, label = None, ""
     for axis, view in zip(axes[0], views, strict=True):
         if view.kind == "class":
             _scatter_classes(axis, along, height, view.values)
@@ -59,10 +61,11 @@ def side_views(xyz: np.ndarray, views: Sequence[View], out: str | Path) -> str:
             order = np.argsort(view.values, kind="stable")
             points = axis.scatter(along[order], height[order], c=view.values[order], s=3, lw=0,
                                   cmap="viridis", vmin=0, vmax=1, rasterized=True)  # fmt: skip
+            label = view.label
         axis.set(title=view.title, xlabel="along [m]")
         axis.set_aspect("equal")
     if points is not None:
-        figure.colorbar(points, ax=axes[0, -1], shrink=0.7, label="probability")
+        figure.colorbar(points, ax=axes[0, -1], shrink=0.7, label=label)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=len(ROLE_COLOURS),
                   frameon=False, markerscale=4, fontsize=9)  # fmt: skip

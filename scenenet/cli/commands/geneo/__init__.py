@@ -1,0 +1,15 @@
+"""``scenenet geneo``: the workbench for kernels."""
+
+from __future__ import annotations
+
+from scenenet.cli.commands.geneo import all_kernels, certify, new_kernel, one_kernel, trial
+
+COMMANDS = {
+    "list": all_kernels,
+    "show": one_kernel,
+    "new": new_kernel,
+    "try": trial,
+    "certify": certify,
+}
+HELP = "List, show, write and try kernels, and certify the GENEO properties of a model."
+EPILOG = "scenenet geneo COMMAND --help explains a command, with examples."

@@ -1,0 +1,118 @@
+"""``scenenet geneo try``."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from scenenet.cli.commands.geneo.options import (
+    ABOVE,
+    BELOW,
+    RADIUS,
+    Above,
+    Below,
+    Name,
+    Radius,
+    Values,
+    VoxelSize,
+    sampled,
+)
+from scenenet.cli.options import AsJson, Codes, Kernels, Overwrite
+from scenenet.cli.output import show
+from scenenet.pointcloud.class_schemes import difference
+
+if TYPE_CHECKING:
+    from scenenet.interpretability.workbench.trial import Trial
+
+EXAMPLES = (
+    "scenenet geneo try cylinder line.laz --codes edp",
+    "scenenet geneo try lamp town.laz --kernels lamp.py --set r=0.2 --out lamp.html",
+)
+
+
+def command(
+    name: Name,
+    survey: Annotated[
+        Path, typer.Argument(help="LAS, LAZ or COPC survey in metres, or TS40K sample.")
+    ],
+    codes: Annotated[
+        Codes | None,
+        typer.Option("--codes", help=f"Class scheme, for the names of classes ({difference()})."),
+    ] = None,
+    values: Values = None,
+    voxel_size: VoxelSize = 1.0,
+    radius: Radius = RADIUS,
+    above: Above = ABOVE,
+    below: Below = BELOW,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="Page with pictures to write (.html).")
+    ] = None,
+    kernels: Kernels = None,
+    overwrite: Overwrite = False,
+    as_json: AsJson = False,
+) -> None:
+    """Try a kernel on a survey: what it answers to, by class, and where it answers most.
+
+    The answer is the response of the kernel alone at each occupied voxel, before any training. The
+    survey is held in memory at once.
+
+    Its equivariance is measured on a generated scene, the same for every kernel. A page that exists
+    is replaced only if this command wrote it.
+    """
+    from scenenet.core.extras import require
+    from scenenet.core.outputs import Output, check_outputs
+    from scenenet.interpretability.workbench.trial import try_kernel
+
+    if out is not None:
+        if out.suffix.lower() not in (".html", ".htm"):
+            raise typer.BadParameter("the page is an .html file", param_hint="--out")
+        require("report", "scenenet geneo try --out")
+        from scenenet.report.trial_page import is_trial
+
+        check_outputs([Output(out, is_trial)], [survey], overwrite=overwrite)
+    chosen = sampled(name, values, voxel_size, radius, above, below)
+    trial = try_kernel(chosen, survey, None if codes is None else codes.value)
+    if out is not None:
+        from scenenet.report.trial_page import write_trial_page
+
+        write_trial_page(trial, out)
+    show(_plain(trial), as_json, lambda _: _lines(trial, out))
+
+
+def _plain(trial: Trial) -> dict[str, Any]:
+    """A trial without its points."""
+    arrays = ("xyz", "codes", "responses")
+    return {name: value for name, value in asdict(trial).items() if name not in arrays}
+
+
+def _lines(trial: Trial, out: Path | None) -> list[str]:
+    values = ", ".join(
+        f"{p.name} = {p.value:.3g}{'' if p.unit == '1' else f' {p.unit}'}" for p in trial.parameters
+    )
+    e = trial.equivariance
+    lines = [
+        f"{trial.kernel} ({values or 'no parameters'}) on {trial.survey}: {trial.points:,} points "
+        f"in {trial.voxels:,} voxels of {trial.voxel_size:g} m",
+        f"equivariance error: shifts {e.translation:.1e}, quarter turns {e.quarter_turn:.1e} of "
+        f"the largest response; {e.between_degrees:g} degrees {e.between:.2f} of its spread "
+        f"(half a voxel: {e.half_voxel:.2f})",
+        "",
+        f"{'class':<34}{'points':>10}{'mean':>10}{'positive':>10}{'highest':>10}",
+    ]
+    for c in trial.classes:
+        lines.append(
+            f"{f'{c.code} {c.name}'.strip():<34}{c.points:>10,}{c.mean:>10.3f}{c.positive:>10.1%}"
+            f"{c.highest:>10.3f}"
+        )
+    lines += ["", f"{'highest answers':<12}{'x':>14}{'y':>14}{'z':>10}{'response':>10}  class"]
+    for number, p in enumerate(trial.places, start=1):
+        lines.append(
+            f"{number:<15}{p.x:>14.2f}{p.y:>14.2f}{p.z:>10.2f}{p.response:>10.3f}  "
+            f"{p.code} {p.name}"
+        )
+    if not trial.places:
+        lines.append("no answer is positive")
+    return lines if out is None else [*lines, "", f"{out}: the page"]

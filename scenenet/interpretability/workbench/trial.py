@@ -1,0 +1,208 @@
+"""A kernel on a survey: where it answers, to which classes, and how equivariant it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scenenet.convolution.occupancy import Occupancy
+from scenenet.core.errors import in_file
+from scenenet.dataset.voxels import VoxelGrid
+from scenenet.interpretability.certificate import SCENE
+from scenenet.interpretability.geneo_properties import certify
+from scenenet.interpretability.workbench.description import KernelFacts, ParameterDescription
+from scenenet.interpretability.workbench.description import parameters_of as described
+from scenenet.interpretability.workbench.one_kernel import OneKernel
+from scenenet.pointcloud import PointCloud, read, survey_in_metres
+from scenenet.pointcloud.class_schemes import SCHEMES
+
+PLACES = 10
+"""Number of places that are listed."""
+APART_M = 5.0
+"""Planar distance of two places, m: that within which a found tower is a labelled one."""
+
+
+@dataclass(frozen=True)
+class ClassAnswer:
+    """The response at the points of one class.
+
+    Attributes:
+        code, name: of the class; the name is empty without a class scheme.
+        points: number of its points.
+        mean: mean response.
+        positive: share of its points with a positive response, in [0, 1].
+        highest: the largest response.
+    """
+
+    code: int
+    name: str
+    points: int
+    mean: float
+    positive: float
+    highest: float
+
+
+@dataclass(frozen=True)
+class Place:
+    """A voxel with a high response.
+
+    Attributes:
+        x, y, z: centre of the voxel, m, in the coordinates of the survey.
+        response: there.
+        code, name: the most frequent class of its points.
+    """
+
+    x: float
+    y: float
+    z: float
+    response: float
+    code: int
+    name: str
+
+
+@dataclass(frozen=True)
+class Equivariance:
+    """How far the response moves with the scene, on ``scene``.
+
+    Attributes:
+        scene: describes the scene.
+        translation: error under a shift by whole voxels, as a share of the largest response.
+        quarter_turn: the same for the worst quarter turn about z.
+        between: mean difference of the response for the worst other angle, as a share of its
+            standard deviation; ``between_degrees`` is that angle.
+        half_voxel: the same for a shift by half a voxel, which moves points into other voxels as
+            every angle does.
+    """
+
+    scene: str
+    translation: float
+    quarter_turn: float
+    between: float
+    between_degrees: float
+    half_voxel: float
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a kernel answers on a survey.
+
+    Attributes:
+        kernel, survey: names.
+        voxel_size: m.
+        points, voxels: numbers of points and of occupied voxels.
+        parameters: with the values that were tried.
+        facts: of the sampled kernel.
+        equivariance: measured on a generated scene, which is the same for every kernel.
+        classes: the response by class, the highest mean first.
+        places: the highest responses, ``APART_M`` from each other.
+        xyz, codes, responses: (N, 3) m, (N,) uint8 and (N,) float32, the points.
+    """
+
+    kernel: str
+    survey: str
+    voxel_size: float
+    points: int
+    voxels: int
+    parameters: tuple[ParameterDescription, ...]
+    facts: KernelFacts
+    equivariance: Equivariance
+    classes: tuple[ClassAnswer, ...]
+    places: tuple[Place, ...]
+    xyz: np.ndarray
+    codes: np.ndarray
+    responses: np.ndarray
+
+
+def try_kernel(chosen: OneKernel, survey: str | Path, codes: str | None = None) -> Trial:
+    """Convolve a survey with a kernel; the whole survey is in memory.
+
+    Args:
+        codes: class scheme of the labels, for the names of the classes; None if it is not known.
+
+    Raises:
+        InputError: the survey cannot be used, has no points, or is too large for the voxels.
+    """
+    survey_in_metres(survey)
+    cloud = read(survey, codes)
+    with in_file(survey):
+        grid = VoxelGrid.on_map(cloud.xyz, chosen.voxel_size)
+    at = grid.voxel_of(cloud.xyz)
+    index, rows = np.unique(at, return_inverse=True)
+    answers = chosen.answers(Occupancy.of_grids([index], None, grid.shape))
+    names = SCHEMES[codes].class_name if codes else None
+    titles = {
+        int(code): names(int(code)) if names else "" for code in np.unique(cloud.classification)
+    }
+    return Trial(
+        kernel=chosen.name,
+        survey=str(survey),
+        voxel_size=chosen.voxel_size,
+        points=len(cloud),
+        voxels=len(index),
+        parameters=described(chosen),
+        facts=KernelFacts.of(chosen.sampled(), chosen.voxel_size),
+        equivariance=measured_equivariance(chosen),
+        classes=_by_class(answers[rows], cloud.classification, titles),
+        places=_places(answers, grid.centres(index), rows, cloud, titles),
+        xyz=cloud.xyz,
+        codes=cloud.classification,
+        responses=answers[rows],
+    )
+
+
+def measured_equivariance(chosen: OneKernel) -> Equivariance:
+    """The equivariance of the response of a kernel, on the scene of the certificates."""
+    found = certify(chosen.model, voxel_size=chosen.voxel_size)
+    others = [turn for turn in found.turns if turn.degrees and turn.degrees % 90]
+    worst = max(others, key=lambda turn: turn.mean_h)
+    return Equivariance(
+        scene=SCENE,
+        translation=found.translation_error,
+        quarter_turn=found.quarter_turn_error,
+        between=worst.mean_h,
+        between_degrees=worst.degrees or 0.0,
+        half_voxel=found.half_voxel.mean_h,
+    )
+
+
+def _by_class(
+    answers: np.ndarray, codes: np.ndarray, titles: Mapping[int, str]
+) -> tuple[ClassAnswer, ...]:
+    """The answers (N,) at points with class codes (N,), by class."""
+    found = []
+    for code, title in titles.items():
+        own = answers[codes == code].astype(float)
+        positive = float((own > 0).mean())
+        found.append(
+            ClassAnswer(code, title, len(own), float(own.mean()), positive, float(own.max()))
+        )
+    return tuple(sorted(found, key=lambda one: -one.mean))
+
+
+def _places(
+    answers: np.ndarray,
+    centres: np.ndarray,
+    rows: np.ndarray,
+    cloud: PointCloud,
+    titles: Mapping[int, str],
+) -> tuple[Place, ...]:
+    """The highest positive answers (M,) at voxels with ``centres`` (M, 3).
+
+    Args:
+        rows: (N,) the voxel of each point.
+    """
+    left = answers > 0
+    found: list[Place] = []
+    for best in np.argsort(-answers, kind="stable"):
+        if len(found) == PLACES or answers[best] <= 0:
+            break
+        if not left[best]:
+            continue
+        x, y, z = centres[best].tolist()
+        left &= np.hypot(centres[:, 0] - x, centres[:, 1] - y) > APART_M
+        code = int(np.bincount(cloud.classification[rows == best]).argmax())
+        found.append(Place(x, y, z, float(answers[best]), code, titles[code]))
+    return tuple(found)

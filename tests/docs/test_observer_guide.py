@@ -1,0 +1,128 @@
+"""``docs/guides/observer.md`` from its first line to its last: a reader's files and commands.
+
+It is the test, too, of a kernel file outside the package: trained, predicted, explained and
+certified by the command line.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fixtures.forked import SCENENET, command_line
+
+LIMIT_S = 600
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A folder in which the page was followed.
+
+    Attributes:
+        folder: with all files.
+        shown: what each command wrote to stdout.
+    """
+
+    folder: Path
+    shown: dict[str, str]
+
+    def call(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Call ``scenenet``."""
+        environment = {name: v for name, v in os.environ.items() if name != "SCENENET_KERNELS"}
+        return command_line().call(SCENENET, arguments, self.folder, environment, LIMIT_S)
+
+    def run(self, line: str) -> None:
+        """Run a line of a shell example."""
+        program, *arguments = shlex.split(line)
+        if program == "scenenet":
+            done = self.call(*arguments)
+        else:
+            module = [] if program == "python" else ["-m", program, "-p", "no:cacheprovider"]
+            call = [sys.executable, *module, *arguments]
+            done = subprocess.run(call, cwd=self.folder, capture_output=True, text=True)
+        assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
+        self.shown[line] = done.stdout
+
+    def output(self, start: str) -> str:
+        """What the last command that begins like this wrote."""
+        return [text for line, text in self.shown.items() if line.startswith(start)][-1]
+
+
+@pytest.fixture(scope="module")
+def reader(tmp_path_factory, project_root: Path) -> Reader:
+    page = (project_root / "docs" / "guides" / "observer.md").read_text(encoding="utf-8")
+    reader = Reader(tmp_path_factory.mktemp("reader"), {})
+    blocks = re.findall(r'```(sh|python title="([\w.]+)")\n(.*?)```', page, re.DOTALL)
+    for kind, file, text in blocks:
+        if kind == "sh":
+            for line in text.splitlines():
+                reader.run(line)
+        else:
+            (reader.folder / file).write_text(text, encoding="utf-8")
+    return reader
+
+
+def test_the_kernel_has_about_thirty_lines(reader):
+    assert len((reader.folder / "lamp.py").read_text().splitlines()) <= 35
+
+
+def test_the_kernel_answers_most_to_lamps_before_training(reader):
+    shown = reader.output("scenenet geneo try")
+    table = shown.partition("positive   highest\n")[2].splitlines()
+    assert table[0].startswith("15 Transmission tower")
+    places = shown.partition("highest answers")[2].splitlines()[1:5]
+    assert all(place.endswith("15 Transmission tower") for place in places), shown
+    assert (reader.folder / "lamp.html").read_text().count("data:image/png") == 5
+
+
+def test_the_model_finds_the_lamps_of_another_street(reader):
+    with (reader.folder / "found" / "other.towers.csv").open() as stream:
+        found = sorted((float(row["x"]), float(row["y"])) for row in csv.DictReader(stream))
+    lamps = [(530_012 + 25 * i, 4_630_010) for i in range(3)]
+    assert np.abs(np.array(found) - lamps).max() < 1
+
+
+def test_each_lamp_is_explained(reader):
+    page = (reader.folder / "why.html").read_text()
+    assert page.count("lamp</t") >= 3
+    assert "lamp reach of the head" in page or "reach of the head" in page
+
+
+def test_the_model_file_names_the_kernel_with_its_digest(reader):
+    from scenenet.core.files import sha256
+
+    model = json.loads((reader.folder / "lamps.json").read_text())
+    entry = model["geneos"][0]
+    assert entry["source"] == {"file": "lamp.py", "sha256": sha256(reader.folder / "lamp.py")}
+    assert "source" not in model["geneos"][1]
+
+
+def test_the_certificate_holds(reader):
+    shown = reader.output("scenenet geneo certify")
+    assert "yes  zero-sum kernels sum to zero" in shown
+    assert "yes  convex combination of GENEOs" in shown
+    assert "yes  equivariant under translation" in shown
+
+
+def test_the_model_is_refused_without_its_kernel_and_with_another(reader, tmp_path):
+    without = reader.call("geneo", "certify", "--model", "lamps.json")
+    assert without.returncode == 1
+    assert without.stderr.startswith("error: lamps.json: it needs the kernel 'lamp' of the file")
+    assert "--kernels" in without.stderr and "Traceback" not in without.stderr
+
+    other = tmp_path / "lamp.py"
+    other.write_text((reader.folder / "lamp.py").read_text() + "# another lamp\n")
+    changed = reader.call("predict", "other.laz", "--model", "lamps.json",
+                          "--kernels", str(other), "--out", "again")  # fmt: skip
+    assert changed.returncode == 1
+    assert "is another one" in changed.stderr and "Traceback" not in changed.stderr
+    assert not (reader.folder / "again").exists()

@@ -1,0 +1,74 @@
+"""What the workbench calculates, against kernels that are simple enough to know."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+
+from scenenet.convolution.convolve import convolve
+from scenenet.convolution.occupancy import Occupancy
+from scenenet.interpretability.workbench.description import KernelFacts, side_view, top_view
+from scenenet.interpretability.workbench.one_kernel import OneKernel
+from scenenet.interpretability.workbench.trial import measured_equivariance
+
+
+def test_the_facts_of_a_kernel_are_those_of_its_values():
+    kernel = torch.zeros(3, 3, 3)
+    kernel[0, 1, 1], kernel[0, 1, 2], kernel[2, 0, 0] = 4.0, -4.0, 2.0
+    facts = KernelFacts.of(kernel, 0.5)
+    assert (facts.total, facts.l1, facts.lowest, facts.highest) == (2.0, 10.0, -4.0, 4.0)
+    assert facts.slice_sum == 2.0
+    assert not facts.sums_to_zero
+    # A quarter turn puts -4 where 0 was: the change is as large as the largest value.
+    assert facts.quarter_turn_error == 1.0
+    kernel[2, 0, 0] = 0.0
+    assert KernelFacts.of(kernel, 0.5).sums_to_zero
+
+
+def test_slices_are_drawn_with_up_and_north_at_the_top():
+    kernel = np.zeros((3, 3, 3))
+    kernel[2, 1, 0], kernel[0, 1, 2], kernel[0, 2, 1] = 0.5, -1.0, 0.01
+    assert [line.split() for line in side_view(kernel)] == [
+        ["4", ".", "."],
+        [".", ".", "."],
+        [".", ".", "-9"],
+    ]
+    row, top = top_view(kernel)
+    assert row == 0
+    assert [line.split() for line in top] == [[".", "+", "."], [".", ".", "-9"], [".", ".", "."]]
+
+
+def test_the_answer_of_one_kernel_is_its_convolution():
+    chosen = OneKernel("cylinder", {"r": 0.4})
+    assert chosen.values["r"] == pytest.approx(0.4, rel=1e-5)
+    low, high = 0.001, 10.0  # of sigma, whose value is not given
+    assert chosen.values["sigma"] == pytest.approx((low * high) ** 0.5, rel=1e-4)
+    rng = np.random.default_rng(3)
+    index = np.flatnonzero(rng.random(12 * 10 * 11) < 0.1)
+    scene = Occupancy.of_grids([index], None, (12, 10, 11))
+    expected = convolve(scene, chosen.sampled()).reshape(-1).numpy()[index]
+    assert np.allclose(chosen.answers(scene), expected, atol=1e-5)
+
+
+def test_a_kernel_that_looks_to_one_side_is_not_equivariant(tmp_path, monkeypatch):
+    from scenenet.core.provided_kernels import VARIABLE
+
+    path = tmp_path / "east.py"
+    path.write_text(
+        "import torch\n"
+        "from scenenet.geneo import GeneoKernel, register\n"
+        "@register\n"
+        "class East(GeneoKernel):\n"
+        "    name = 'east'\n"
+        "    parameters = ()\n"
+        "    def sample(self, lattice, shape):\n"
+        "        kernel = torch.zeros(lattice.size)\n"
+        "        kernel[:, :, -1] = 1.0\n"
+        "        return kernel * (lattice.inside if lattice.inside is not None else 1.0)\n"
+    )
+    monkeypatch.setenv(VARIABLE, str(path))
+    east, round_one = OneKernel("east"), OneKernel("cylinder")
+    assert KernelFacts.of(east.sampled(), 1.0).quarter_turn_error == 1.0
+    assert measured_equivariance(east).quarter_turn > 0.1
+    assert measured_equivariance(round_one).quarter_turn < 1e-5

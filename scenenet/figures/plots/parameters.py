@@ -29,7 +29,6 @@ def kernels(
     out: str | Path,
     starts: Mapping[str, np.ndarray] | None = None,
     metres: float | None = None,
-    stage: str = "trained",
 ) -> str:
     """Slices through the middle of each kernel (thesis Figures 4.2 to 4.4).
 
@@ -38,9 +37,10 @@ def kernels(
         out: PNG to write.
         starts: the kernels before training, in two rows above the others, with the same colours.
         metres: size of a voxel where the kernels are in metres; the axes are in voxels if None.
-        stage: what the kernels are, in the labels.
     """
-    stages = {stage: weights} if starts is None else {"at the start": starts, stage: weights}
+    stages = (
+        {"trained": weights} if starts is None else {"at the start": starts, "trained": weights}
+    )
     views = [(stage, view) for stage in stages for view in ("side", "top")]
     deep, broad, wide = np.max([kernel.shape for kernel in weights.values()], axis=0)
     tall = {"side": float(deep / wide), "top": float(broad / wide)}
@@ -58,8 +58,10 @@ def kernels(
         axes[0, column].set_title(readable(name))
         figure.colorbar(image, ax=axes[:, column], location="bottom", shrink=0.85, pad=0.02,
                         label="weight")  # fmt: skip
-    for axis, (shown_stage, view) in zip(axes[:, 0], views, strict=True):
-        axis.annotate(f"{shown_stage}, {'from the side' if view == 'side' else 'from above'}",
+    # The axes of a single kernel say enough.
+    rows = [] if len(weights) == len(stages) == 1 else zip(axes[:, 0], views, strict=True)
+    for axis, (stage, view) in rows:
+        axis.annotate(f"{stage}, {'from the side' if view == 'side' else 'from above'}",
                       (-0.42, 0.5), xycoords="axes fraction", rotation=90, va="center",
                       ha="center", fontsize=9, fontweight="bold")  # fmt: skip
     save(figure, out)

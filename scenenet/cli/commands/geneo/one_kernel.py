@@ -80,7 +80,7 @@ def command(
     if out is not None:
         from scenenet.figures.plots.parameters import kernels as draw
 
-        draw({name: kernel.numpy()}, out, metres=voxel_size, stage="sampled")
+        draw({name: kernel.numpy()}, out, metres=voxel_size)
     data = asdict(described) | {
         "parameters": [asdict(parameter) for parameter in parameters],
         "facts": asdict(facts),

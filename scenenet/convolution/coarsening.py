@@ -16,9 +16,9 @@ OBSERVED_M = 1.0
 """Edge of the blocks, m: about the voxel size of a 64^3 grid over a crop of two tower heights."""
 
 
-def block_edge(voxel_size: float) -> int:
-    """Voxels per edge of the block whose size is nearest to ``OBSERVED_M``; at least 1."""
-    return max(1, round(OBSERVED_M / voxel_size))
+def block_edge(voxel_size: float, observed: float = OBSERVED_M) -> int:
+    """Voxels per edge of the block whose size is nearest to ``observed`` m; at least 1."""
+    return max(1, round(observed / voxel_size))
 
 
 def coarsened(occupancy: Occupancy, edge: int) -> tuple[Occupancy, np.ndarray]:

@@ -84,6 +84,12 @@ class Occupancy:
         grid = np.repeat(np.arange(len(self)), np.diff(self.offsets))
         return self.index + grid * int(np.prod(self.shape))
 
+    def measured(self, values: np.ndarray) -> Occupancy:
+        """The same grids with other measurements (M,), without the voxels where they are 0."""
+        kept = values > 0
+        before = np.concatenate([[0], np.cumsum(kept)])
+        return Occupancy(self.index[kept], values[kept], before[self.offsets], self.shape)
+
     def plane_rows(self, flat: np.ndarray) -> np.ndarray:
         """(B * D + 1,) int64: ascending positions ``flat`` (N,) in (B, D, H, W) have their rows
         [p] to [p + 1] in plane p."""

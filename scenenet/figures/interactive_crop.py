@@ -123,11 +123,9 @@ def _shares(
         return {}
     size = voxels.grid.voxel_size
     model = model.at(model.observed_size(size))
-    observed, block = coarsened(
-        batch([voxels], measurement)[0], round(model.observed_size(size) / size)
-    )
+    observed, block = coarsened(batch([voxels], measurement)[0], model.block_edge(size))
     with torch.no_grad():
-        parts = model.responses(observed, model.weighted_kernels()).numpy()[:, block]
+        parts = model.responder()(observed).numpy()[:, block]
     whole = np.maximum(np.abs(parts).sum(axis=0), np.finfo(parts.dtype).tiny)
     percent = np.rint(100 * parts / whole).astype(np.int8)
     return dict(zip(model.names, percent, strict=True))

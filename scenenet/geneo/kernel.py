@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import torch
 from torch import Tensor
 
+from scenenet.geneo.lattice import Lattice
 from scenenet.geneo.sentences import Sentence, body_radius
 
 MIN_SIGMA = 1e-6
@@ -107,73 +109,16 @@ def shell_sigma(
     )
 
 
-@dataclass(frozen=True)
-class Lattice:
-    """The positions at which a kernel is sampled, in voxels or in metres.
-
-    The kernel's centre lies on element ``(k - 1) // 2`` of each axis, the element that the
-    convolution aligns with the output voxel (see ``scenenet.convolution.convolve``). An even size
-    has one more element on the high side, so no size shifts the response by half a voxel.
+class Extent(NamedTuple):
+    """How far a kernel reaches from its centre, in the unit of its lengths.
 
     Attributes:
-        size: (kz, ky, kx).
-        z: (kz, 1, 1) height above the centre.
-        planar_squared: (1, ky, kx) squared distance from the vertical axis, ||pi_-3(x - c)||^2.
-        inside: (1, ky, kx), 1 in the support of the kernel and 0 elsewhere; None if the support is
-            the whole box.
-        voxel: m, edge of the voxels in which the points are, for kernels with measured numbers. 0
-            samples the formula of a kernel at the centres of the voxels.
+        up, down, around: upwards, downwards, and in plan.
     """
 
-    size: tuple[int, int, int]
-    z: Tensor
-    planar_squared: Tensor
-    inside: Tensor | None = None
-    voxel: float = 0.0
-
-    @classmethod
-    def of_size(
-        cls,
-        size: tuple[int, int, int],
-        dtype: torch.dtype = torch.float32,
-    ) -> Lattice:
-        """The lattice in voxels of a kernel of ``size`` (kz, ky, kx), each at least 1.
-
-        Raises:
-            ValueError: the size is not three positive integers.
-        """
-        if len(size) != 3 or min(size) < 1:
-            raise ValueError(f"kernel size must be three positive integers, not {size}")
-        z, y, x = (torch.arange(k, dtype=dtype) - (k - 1) // 2 for k in size)
-        planar = y[:, None] ** 2 + x[None, :] ** 2
-        return cls(size, z[:, None, None], planar[None])
-
-    @classmethod
-    def of_extent(
-        cls,
-        size: tuple[int, int, int],
-        radius: float,
-        voxel_size: float,
-        dtype: torch.dtype = torch.float32,
-        voxel: float = 0.0,
-    ) -> Lattice:
-        """The lattice in metres, limited to ``radius`` around the vertical axis. A disc has no
-        corners, which would change the response when the scene rotates.
-
-        Args:
-            size: (kz, ky, kx), all odd.
-            radius, voxel_size: m.
-            voxel: m, as in the attributes.
-        """
-        voxels = cls.of_size(size, dtype)
-        planar = voxels.planar_squared * voxel_size**2
-        inside = (planar <= (radius * (1 + 1e-6)) ** 2).to(dtype)
-        return cls(size, voxels.z * voxel_size, planar, inside, voxel)
-
-    @property
-    def top(self) -> float:
-        """Height of the highest element above the centre."""
-        return float(self.z[-1, 0, 0])
+    up: float
+    down: float
+    around: float
 
 
 class GeneoKernel(ABC):
@@ -182,28 +127,61 @@ class GeneoKernel(ABC):
     To add one, put a file with a subclass into ``scenenet/geneo/kernels`` and decorate it with
     ``scenenet.geneo.register``; no other file changes.
 
+    A kernel with a direction points along x. The operator is then the maximum of the responses of
+    the kernel over an orbit, its turns about z, and a turn by a multiple of 360 degrees over
+    ``turns`` only permutes the orbit. A maximum of non-expansive operators is non-expansive too, so
+    the operator is a GENEO with respect to these turns (Eq. 3.1, 3.2).
+
     Attributes:
         name: its name in settings, model files and tables.
         parameters: the shape parameters, in the order in which tables list them.
         sums_to_zero: whether every horizontal slice sums to zero by design (thesis 4.4.1); the
             certificate of a model verifies it.
+        turns: number of turns about z in its orbit; 1 for a kernel without a direction, which is
+            the same after every turn.
+        slopes: rises of the kernel along its direction, as ratios; the maximum is over them too.
+        adds_up_height: whether its response is a sum over heights, as that of a tower's body, so
+            that a model in metres weighs it by the edge of a voxel.
     """
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[ShapeParameter, ...]]
     sums_to_zero: ClassVar[bool] = False
+    turns: ClassVar[int] = 1
+    slopes: ClassVar[tuple[float, ...]] = (0.0,)
+    adds_up_height: ClassVar[bool] = True
 
     @abstractmethod
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
         """The kernel's values on the lattice; differentiable in every shape parameter.
 
         Args:
-            lattice: the positions.
+            lattice: the positions, in the frame of the kernel.
             shape: a 0-dimensional tensor for each of ``parameters``, by name.
 
         Returns:
-            (kz, ky, kx), axes z (up), y, x.
+            (kz, ky, kx), axes z (up), y, x of the grid.
         """
+
+    def extent(self, shape: Mapping[str, float]) -> Extent | None:
+        """How far it reaches with these numbers, in the unit of its lengths; None if it fills the
+        lengths that the settings of a model give all kernels (``MetricSettings``)."""
+        return None
+
+    @property
+    def oriented(self) -> bool:
+        """Whether it has a direction."""
+        return self.turns > 1 or self.slopes != (0.0,)
+
+    def orbit(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
+        """The kernel in all its directions, (turns * slopes, kz, ky, kx)."""
+        return torch.stack(
+            [
+                self.sample(lattice.turned(2 * math.pi * turn / self.turns, slope), shape)
+                for turn in range(self.turns)
+                for slope in self.slopes
+            ]
+        )
 
 
 def zero_sum(kernel: Tensor, inside: Tensor | None = None) -> Tensor:

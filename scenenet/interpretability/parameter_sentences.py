@@ -37,17 +37,15 @@ def parameters_of(model: GeneoModel, voxel_size: float) -> list[Parameter]:
     Args:
         voxel_size: m, edge of the voxels that kernels in voxels were trained on.
     """
-    # Imported here because the names of tables must be available without loading torch.
-    from scenenet.geneo import kernel_named
-
     metres = model.length_unit_m(voxel_size)
     found = []
-    for name, geneo in zip(model.names, model.geneos, strict=True):
-        for parameter in kernel_named(geneo).parameters:
+    for prefix, stage in model.stages():
+        for name, parameter in stage.shape_list():
             factor = {"voxel": metres, "voxel^2": metres**2}.get(parameter.unit, 1.0)
-            label = f"{name}.{parameter.name}"
+            label = f"{prefix}{name}.{parameter.name}"
             found.append(Parameter(label, parameter.name, parameter.metric_unit, factor))
-    return found + [Parameter(f"lambda.{name}", "lambda", "1", 1.0) for name in model.names]
+        found += [Parameter(f"{prefix}lambda.{name}", "lambda", "1", 1.0) for name in stage.names]
+    return found
 
 
 def sentences(
@@ -60,18 +58,19 @@ def sentences(
         reference: lengths to compare with.
     """
     # Imported here because the names of tables must be available without loading torch.
-    from scenenet.geneo import kernel_named
     from scenenet.geneo.sentences import Reference
 
     texts = {}
-    for name, geneo in zip(model.names, model.geneos, strict=True):
-        kernel = kernel_named(geneo)
-        numbers = {p.name: values[f"{name}.{p.name}"] for p in kernel.parameters}
-        for parameter in kernel.parameters:
-            text = sentence_of(parameter, numbers, reference or Reference())
-            texts[f"{name}.{parameter.name}"] = text
-    weights = {name: values[f"lambda.{name}"] for name in model.names}
-    return texts | {f"lambda.{name}": _weight(name, weights) for name in weights}
+    for prefix, stage in model.stages():
+        for name in stage.names:
+            label, parameters = f"{prefix}{name}", stage.parameters_of(name)
+            numbers = {p.name: values[f"{label}.{p.name}"] for p in parameters}
+            for parameter in parameters:
+                text = sentence_of(parameter, numbers, reference or Reference())
+                texts[f"{label}.{parameter.name}"] = text
+        weights = {name: values[f"{prefix}lambda.{name}"] for name in stage.names}
+        texts |= {f"{prefix}lambda.{name}": _weight(name, weights) for name in weights}
+    return texts
 
 
 def sentence_of(parameter: ShapeParameter, numbers: Numbers, reference: Reference) -> str:

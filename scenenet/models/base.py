@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import ClassVar, Self
 
 from torch import Tensor, nn
@@ -44,6 +44,10 @@ class VoxelModel(nn.Module):
         ``voxel_size`` m."""
         return voxel_size
 
+    def block_edge(self, voxel_size: float) -> int:
+        """Voxels per edge of these blocks."""
+        return 1
+
     @property
     def whole_towers(self) -> bool:
         """Whether the model predicts whole towers instead of the voxels at or above tau."""
@@ -77,9 +81,29 @@ class VoxelModel(nn.Module):
         cross-sections."""
         return convolve_at_voxels(occupancy, kernels)
 
+    @property
+    def linear(self) -> bool:
+        """Whether its response before tanh is that of one kernel, which ``observer`` gives."""
+        return True
+
+    def responder(self) -> Callable[[Occupancy], Tensor]:
+        """A function from grids to the parts (K, M) of H at their occupied voxels, whose sum over K
+        is H; no gradient. The kernels are sampled once, for all grids."""
+        kernel, bias = self.observer()
+
+        def parts(occupancy: Occupancy) -> Tensor:
+            found = self.responses(occupancy, kernel.detach()[None])
+            return found if bias is None else found + bias.detach()
+
+        return parts
+
     @abstractmethod
     def observer(self) -> tuple[Tensor, Tensor | None]:
-        """The summed kernel (kz, ky, kx) and the bias (), None for a model without bias."""
+        """The summed kernel (kz, ky, kx) and the bias (), None for a model without bias.
+
+        Raises:
+            NotImplementedError: the model is not linear.
+        """
 
     def forward(self, occupancy: Occupancy) -> Tensor:
         """Probability that each voxel is part of a tower, (tanh H)_+, (B, D, H, W) in [0, 1]."""

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from scenenet.convolution.convolve import convolve
+from scenenet.convolution.convolve import convolve, convolve_at_voxels
 from scenenet.convolution.occupancy import Occupancy
+from scenenet.convolution.orbit import Orbit, strongest, strongest_at_voxels
 from scenenet.core.errors import InputError
-from scenenet.geneo import Lattice, ShapeParameter, kernel_named
+from scenenet.geneo import GeneoKernel, ShapeParameter, kernel_named
 from scenenet.models.base import VoxelModel
 
 
@@ -77,7 +78,8 @@ class GeneoModel(VoxelModel):
 
     @abstractmethod
     def kernels(self) -> Tensor:
-        """The sampled kernels, (K, kz, ky, kx), before mixing."""
+        """The sampled kernels, (K, kz, ky, kx), before mixing; those with a direction point along
+        x."""
 
     @abstractmethod
     def unit_of(self, parameter: ShapeParameter) -> str:
@@ -91,26 +93,85 @@ class GeneoModel(VoxelModel):
     def _assign(self, numbers: Mapping[str, float]) -> None:
         """Store the verified ``numbers`` of ``set_shape_parameters``."""
 
+    def kernel_of(self, name: str) -> GeneoKernel:
+        """The kernel behind the GENEO called ``name``."""
+        return kernel_named(self.geneos[self.names.index(name)])
+
     def parameters_of(self, name: str) -> tuple[ShapeParameter, ...]:
         """Shape parameters of the kernel behind the GENEO called ``name``."""
-        return kernel_named(self.geneos[self.names.index(name)]).parameters
+        return self.kernel_of(name).parameters
+
+    @property
+    def linear(self) -> bool:
+        return not any(kernel_named(geneo).oriented for geneo in self.geneos)
+
+    def shape_list(self) -> list[tuple[str, ShapeParameter]]:
+        """Each of its own shape parameters, with the name of its GENEO."""
+        return [(name, p) for name in self.names for p in self.parameters_of(name)]
 
     def observer(self) -> tuple[Tensor, None]:
+        if not self.linear:
+            raise NotImplementedError("the maximum over an orbit is not one kernel")
         return torch.einsum("k,kzyx->zyx", self.mixing_weights(), self.kernels()), None
+
+    def forward(self, occupancy: Occupancy) -> Tensor:
+        if self.linear:
+            return super().forward(occupancy)
+        return torch.relu(torch.tanh(self.contributions(occupancy).sum(dim=0)))
 
     def contributions(self, occupancy: Occupancy) -> Tensor:
         """Contribution of each GENEO to the observer, lambda_k (g_k * x), (K, B, D, H, W).
 
         The sum over k is H, the observer's response before tanh.
         """
-        return convolve(occupancy, self.weighted_kernels())
+        if self.linear:
+            return convolve(occupancy, self.weighted_kernels())
+        answers = [
+            strongest(occupancy, orbit) if len(orbit) > 1 else convolve(occupancy, orbit[0])
+            for orbit in self.orbits()
+        ]
+        return torch.stack([w * h for w, h in zip(self.mixing_weights(), answers, strict=True)])
+
+    def orbits(self) -> list[Tensor]:
+        """The kernels of each GENEO in all its directions, (n, kz, ky, kx) each, before mixing."""
+        return [kernel[None] for kernel in self.kernels()]
+
+    def responder(self) -> Callable[[Occupancy], Tensor]:
+        if self.linear:
+            kernels = self.weighted_kernels().detach()
+            return lambda occupancy: self.responses(occupancy, kernels)
+        weights = self.mixing_weights().detach()
+        orbits = [Orbit.of(kernels) if len(kernels) > 1 else kernels for kernels in self.orbits()]
+
+        def parts(occupancy: Occupancy) -> Tensor:
+            answers = [
+                torch.from_numpy(strongest_at_voxels(occupancy, orbit))
+                if isinstance(orbit, Orbit)
+                else convolve_at_voxels(occupancy, orbit)[0]
+                for orbit in orbits
+            ]
+            return weights[:, None] * torch.stack(answers)
+
+        return parts
 
     def weighted_kernels(self) -> Tensor:
         """lambda_k g_k, (K, kz, ky, kx): the kernels whose sum is the observer's."""
         return self.mixing_weights()[:, None, None, None] * self.kernels()
 
+    def stages(self) -> list[tuple[str, GeneoModel]]:
+        """The observers that it is composed of, each with the prefix of the names of its numbers:
+        itself, without a prefix, and then those whose answers it measures."""
+        return [("", self)]
+
     def shape_parameters(self) -> dict[str, float]:
-        """Every trained number and the derived last mixing weight, by name (``cylinder.r``)."""
+        """Every trained number and the derived last mixing weights, by name (``cylinder.r``)."""
+        return {
+            f"{prefix}{name}": number
+            for prefix, model in self.stages()
+            for name, number in model._own_numbers().items()
+        }
+
+    def _own_numbers(self) -> dict[str, float]:
         numbers = {
             f"{name}.{symbol}": float(value.detach())
             for name in self.names
@@ -120,7 +181,7 @@ class GeneoModel(VoxelModel):
         return numbers | {f"lambda.{n}": w for n, w in zip(self.names, weights, strict=True)}
 
     def set_shape_parameters(self, numbers: Mapping[str, float]) -> None:
-        """Set the numbers that ``shape_parameters`` returns; the last mixing weight is derived.
+        """Set the numbers that ``shape_parameters`` returns; the last mixing weights are derived.
 
         Raises:
             InputError: a number is missing, unknown or not finite, or the mixing weights do not
@@ -134,10 +195,12 @@ class GeneoModel(VoxelModel):
         for name, number in numbers.items():
             if not abs(number) <= torch.finfo(torch.float32).max:
                 raise InputError(f"{name} is {number:g}, not a finite number")
-        total = sum(numbers[f"lambda.{name}"] for name in self.names)
-        if abs(total - 1) > 1e-4:
-            raise InputError(f"mixing weights sum to {total:.6f}, not to 1")
-        self._assign(numbers)
+        for prefix, model in self.stages():
+            own = {name: numbers[f"{prefix}{name}"] for name in model._own_numbers()}
+            total = sum(own[f"lambda.{name}"] for name in model.names)
+            if abs(total - 1) > 1e-4:
+                raise InputError(f"mixing weights sum to {total:.6f}, not to 1")
+            model._assign(own)
 
     def numbers(self) -> np.ndarray:
         """The trained numbers as they are stored, (P,) float64: shapes first, then mixing."""
@@ -147,15 +210,6 @@ class GeneoModel(VoxelModel):
         """Set what ``numbers`` returns."""
         for parameter, value in zip(self.parameters(), numbers, strict=True):
             parameter.data.fill_(float(value))
-
-    def _sampled(self, lattice: Lattice) -> Tensor:
-        """The kernels on ``lattice``, (K, kz, ky, kx)."""
-        return torch.stack(
-            [
-                kernel_named(geneo).sample(lattice, self.shape_of(name))
-                for name, geneo in zip(self.names, self.geneos, strict=True)
-            ]
-        )
 
     def _stored_shape(self, name: str) -> nn.ParameterDict:
         return cast(nn.ParameterDict, self.shapes[name])

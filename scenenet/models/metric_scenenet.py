@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Self
 
 import numpy as np
@@ -22,7 +22,7 @@ from scenenet.convolution.cross_section import (
 )
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
-from scenenet.geneo import Lattice, ShapeParameter, kernel_named
+from scenenet.geneo import Extent, Lattice, ShapeParameter
 from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.models.evidence import Evidence
@@ -61,9 +61,13 @@ class MetricSceneNet(GeneoModel):
       extent of the voxels (``scenenet.geneo.kernel.seen_shell``).
     - An empty voxel has probability 0. An occupied voxel takes the strongest response in its
       cross-section (``scenenet.convolution.cross_section``).
+    - With a first observer, the measurement phi is the probability that this one gives. The
+      composition of GENEOs is a GENEO. Voxels with phi 0 count as empty.
 
     Attributes:
         metric: the lengths, m.
+        first: the observer whose answer is the measurement of this one; None for one that
+            measures points.
         voxel_size: m, edge of the voxels that the kernels are sampled at.
         evidence: what the training data say about each number, by name; empty before training and
             for files of earlier versions.
@@ -78,6 +82,7 @@ class MetricSceneNet(GeneoModel):
         geneos: Sequence[str] = THESIS_GENEOS,
         metric: MetricSettings | None = None,
         *,
+        first: MetricSceneNet | None = None,
         generator: torch.Generator | None = None,
     ) -> None:
         """Draw the parameters at random over their ranges; the initial voxel size is 1 m.
@@ -85,6 +90,7 @@ class MetricSceneNet(GeneoModel):
         Args:
             geneos: kernel names; a name may be repeated.
             metric: lengths; the defaults if None.
+            first: as in the attributes.
             generator: source of the random numbers; torch's default if None.
 
         Raises:
@@ -92,6 +98,7 @@ class MetricSceneNet(GeneoModel):
         """
         super().__init__(geneos, generator)
         self.metric = metric or MetricSettings()
+        self.first = first
         self.evidence: dict[str, Evidence] = {}
         for label, value in self.fixed_numbers().items():
             name, symbol = label.rsplit(".", 1)
@@ -114,6 +121,9 @@ class MetricSceneNet(GeneoModel):
         if voxel_size == self.voxel_size:
             return self
         other = copy.copy(self)  # shallow: both models share the trained numbers
+        if self.first is not None:
+            other._modules = dict(self._modules)
+            other.first = self.first.at(voxel_size)
         other._discretise(voxel_size)
         return other
 
@@ -169,13 +179,19 @@ class MetricSceneNet(GeneoModel):
         """m, radius of the cross-section: the body with its corners."""
         return max(self.metric.section_radius, math.sqrt(2) * self.body_radius() + CORNER_M)
 
+    def extent_of(self, name: str) -> Extent:
+        """m, how far the GENEO called ``name`` reaches."""
+        numbers = {symbol: float(v.detach()) for symbol, v in self.shape_of(name).items()}
+        own = self.kernel_of(name).extent(numbers)
+        return own or Extent(self.metric.above, self.metric.below, self.support_of(name))
+
     def _discretise(self, voxel_size: float) -> None:
-        up, down = (whole_voxels(m, voxel_size) for m in (self.metric.above, self.metric.below))
-        widest = max(self.support_of(name) for name in self.names)
-        wide = 2 * whole_voxels(widest, voxel_size) + 1
-        # Centred on the voxel it responds at, so twice the longer side high; ``kernels`` sets the
+        extents = [self.extent_of(name) for name in self.names]
+        high = whole_voxels(max(max(e.up, e.down) for e in extents), voxel_size)
+        wide = 2 * whole_voxels(max(e.around for e in extents), voxel_size) + 1
+        # Centred on the voxel it responds at, so twice the longer side high; ``_orbit`` sets the
         # excess of the shorter side to zero.
-        size = (2 * max(up, down) + 1, wide, wide)
+        size = (2 * high + 1, wide, wide)
         if max(size) > LARGEST_KERNEL:
             raise InputError(
                 f"its kernels would have {'x'.join(map(str, size))} voxels of {voxel_size:g} m, "
@@ -186,8 +202,11 @@ class MetricSceneNet(GeneoModel):
         self.kernel_size = size
         self.voxel_size = float(voxel_size)
 
+    def block_edge(self, voxel_size: float) -> int:
+        return block_edge(voxel_size, self.metric.observed)
+
     def observed_size(self, voxel_size: float) -> float:
-        return voxel_size * block_edge(voxel_size)
+        return voxel_size * self.block_edge(voxel_size)
 
     @property
     def whole_towers(self) -> bool:
@@ -206,14 +225,42 @@ class MetricSceneNet(GeneoModel):
         z, y, x = super().reach
         wide = whole_voxels(self.section_radius, self.voxel_size)
         high = whole_voxels(self.metric.section_above, self.voxel_size)
-        return z + high, y + wide, x + wide
+        before = (0, 0, 0) if self.first is None else self.first.reach
+        return z + high + before[0], y + wide + before[1], x + wide + before[2]
 
     def section(self, occupancy: Occupancy) -> Section:
         """The cross-section of each occupied voxel. With measured numbers it has empty voxels too,
         because the axis of a wide tower is in the air."""
         lengths = self.section_radius, self.metric.section_above
         offsets = section_offsets(*lengths, self.voxel_size)
-        return section_of(occupancy, offsets, hollow=self.measured)
+        return section_of(occupancy, offsets, hollow=self.measured and self.linear)
+
+    @property
+    def linear(self) -> bool:
+        return super().linear and self.first is None
+
+    def responder(self) -> Callable[[Occupancy], Tensor]:
+        if self.linear:
+            return super().responder()
+        answer = super().responder()
+        measure = None if self.first is None else self.first.responder()
+
+        def parts(occupancy: Occupancy) -> Tensor:
+            if measure is None:
+                return self._in_sections(answer(occupancy), occupancy)
+            phi = torch.relu(torch.tanh(measure(occupancy).sum(dim=0)))
+            found = torch.zeros((len(self.names), len(occupancy.index)), dtype=phi.dtype)
+            measured = occupancy.measured(phi.numpy())
+            found[:, phi > 0] = self._in_sections(answer(measured), measured)
+            return found
+
+        return parts
+
+    def _in_sections(self, parts: Tensor, occupancy: Occupancy) -> Tensor:
+        """The parts (K, M) of the voxel in each cross-section that responds most."""
+        section = self.section(occupancy)
+        rows = strongest(parts.sum(dim=0).numpy(), section.starts, section.rows)
+        return parts[:, torch.from_numpy(rows)]
 
     def responses(self, occupancy: Occupancy, kernels: Tensor) -> Tensor:
         section = self.section(occupancy)
@@ -226,8 +273,11 @@ class MetricSceneNet(GeneoModel):
 
         It is 0 in empty voxels, and there is no gradient.
         """
-        kernel, _ = self.observer()
-        observed = self.responses(occupancy, kernel.detach()[None])[0]
+        if self.linear:
+            kernel, _ = self.observer()
+            observed = self.responses(occupancy, kernel.detach()[None])[0]
+        else:
+            observed = self.responder()(occupancy).sum(dim=0)
         volume = torch.zeros(occupancy.n_voxels, dtype=observed.dtype)
         volume[torch.from_numpy(occupancy.flat())] = torch.relu(torch.tanh(observed))
         return volume.reshape(len(occupancy), *occupancy.shape)
@@ -246,20 +296,26 @@ class MetricSceneNet(GeneoModel):
         return torch.softmax(torch.stack([*free, torch.zeros(())]), dim=0)
 
     def kernels(self) -> Tensor:
-        return torch.stack([self._kernel(name) for name in self.names])
+        return torch.stack([self._sampled(name, (0.0, 0.0))[0] for name in self.names])
 
-    def _kernel(self, name: str) -> Tensor:
-        """The sampled kernel of the GENEO called ``name``, (kz, ky, kx)."""
+    def orbits(self) -> list[Tensor]:
+        return [self._sampled(name) for name in self.names]
+
+    def _sampled(self, name: str, direction: tuple[float, float] | None = None) -> Tensor:
+        """The kernel of the GENEO called ``name`` in one direction (azimuth, slope) or in all of
+        its orbit, (n, kz, ky, kx)."""
         seen = self.voxel_size if self.measured else 0.0
-        support = self.support_of(name)
-        lattice = Lattice.of_extent(self.kernel_size, support, self.voxel_size, voxel=seen)
-        ends = (lattice.z >= -self.metric.below * (1 + 1e-6)) & (
-            lattice.z <= self.metric.above * (1 + 1e-6)
-        )
+        up, down, around = self.extent_of(name)
+        lattice = Lattice.of_extent(self.kernel_size, around, self.voxel_size, voxel=seen)
+        ends = (lattice.z >= -down * (1 + 1e-6)) & (lattice.z <= up * (1 + 1e-6))
         assert lattice.inside is not None
-        kernel = kernel_named(self.geneos[self.names.index(name)])
-        sampled = kernel.sample(lattice, self.shape_of(name))
-        return sampled * lattice.inside * ends * (self.voxel_size / COLUMN_M)
+        kernel, shape = self.kernel_of(name), self.shape_of(name)
+        if direction is None:
+            sampled = kernel.orbit(lattice, shape)
+        else:
+            sampled = kernel.sample(lattice.turned(*direction), shape)[None]
+        scale = self.voxel_size / COLUMN_M if kernel.adds_up_height else 1.0
+        return sampled * lattice.inside * ends * scale
 
     def unit_of(self, parameter: ShapeParameter) -> str:
         return parameter.metric_unit
@@ -285,10 +341,19 @@ class MetricSceneNet(GeneoModel):
             self.mixing[name].data.fill_(math.log(max(weight, TINY) / max(weights[-1], TINY)))
         self._discretise(self.voxel_size)
 
+    def stages(self) -> list[tuple[str, GeneoModel]]:
+        before = [] if self.first is None else self.first.stages()
+        return [*super().stages(), *((f"first.{prefix}", model) for prefix, model in before)]
+
     def set_numbers(self, numbers: np.ndarray) -> None:
         super().set_numbers(numbers)
-        if self.measured:  # the kernels are as large as the lengths require
-            self._discretise(self.voxel_size)
+        self._follow_numbers()
+
+    def _follow_numbers(self) -> None:
+        """Make the kernels as large as their lengths require."""
+        if self.first is not None:
+            self.first._follow_numbers()
+        self._discretise(self.voxel_size)
 
     def _store(self, name: str, parameter: ShapeParameter, value: float) -> None:
         low, high = self.bounds_of(parameter)

@@ -18,11 +18,11 @@ from pydantic import (
 )
 from torch import Tensor
 
+from scenenet.convolution.coarsening import OBSERVED_M
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, write_json
 from scenenet.core.settings import Settings
 from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL, Fit, Measurement
-from scenenet.geneo import kernel_named
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
 from scenenet.models.evidence import Evidence
@@ -35,8 +35,11 @@ from scenenet.pointcloud.targets import TOWER, Target
 
 FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
+COMPOSED_VERSION = 5
+"""Version of the file of a SCENE-Net in metres that is not one kernel: it has kernels with a
+direction or a first observer, or observes blocks of another size."""
 METRIC_VERSION = 4
-"""Version of the file of a SCENE-Net in metres."""
+"""Version of the file of every other SCENE-Net in metres."""
 SEARCHED_VERSION = 3
 """Version of the same file before numbers were measured: all of them are searched."""
 FIELD_VERSION = 2
@@ -112,7 +115,7 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
     model = model.at(model.observed_size(card.voxel_size))
     head = {
         "format": FORMAT,
-        "format_version": METRIC_VERSION if model.units == "m" else FORMAT_VERSION,
+        "format_version": _version(model),
         "kind": model.kind,
         "kernel_size": list(model.kernel_size),
         **card.model_dump(),
@@ -175,33 +178,50 @@ def is_model_file(path: str | Path) -> bool:
     return True
 
 
-def _numbers(model: GeneoModel) -> dict[str, Any]:
-    """The parameters of a SCENE-Net in a readable form."""
-    values = model.shape_parameters()
+def _version(model: VoxelModel) -> int:
+    """The version of the file of a model."""
+    if not isinstance(model, MetricSceneNet):
+        return FORMAT_VERSION
+    usual = model.linear and model.metric.observed == OBSERVED_M
+    return METRIC_VERSION if usual else COMPOSED_VERSION
+
+
+def _observer(model: GeneoModel, prefix: str, values: Mapping[str, float]) -> dict[str, Any]:
+    """The kernels and mixing weights of an observer, with the numbers that ``prefix`` begins."""
     geneos = []
     for name, geneo in zip(model.names, model.geneos, strict=True):
         parameters = {
             p.name: {
-                "value": values[f"{name}.{p.name}"],
+                "value": values[f"{prefix}{name}.{p.name}"],
                 "unit": model.unit_of(p),
                 "meaning": p.meaning,
             }
-            for p in kernel_named(geneo).parameters
+            for p in model.parameters_of(name)
         }
         entry = {"name": name, "kernel": geneo, **record_of(geneo), "parameters": parameters}
         geneos.append(entry)
-    mixing = {name: values[f"lambda.{name}"] for name in model.names}
+    mixing = {name: values[f"{prefix}lambda.{name}"] for name in model.names}
+    return {"geneos": geneos, "mixing_weights": mixing}
+
+
+def _numbers(model: GeneoModel) -> dict[str, Any]:
+    """The parameters of a SCENE-Net in a readable form."""
+    values = model.shape_parameters()
+    (_, own), *before = model.stages()
     lengths: dict[str, Any] = {}
+    if before:
+        (prefix, first) = before[0]
+        lengths["first"] = _observer(first, prefix, values)
     if isinstance(model, MetricSceneNet):
         lengths["metric"] = model.metric.model_dump()
         known = {name: said.model_dump() for name, said in model.evidence.items()}
         lengths |= {"evidence": known} if known else {}
-    return {"units": model.units, "geneos": geneos, "mixing_weights": mixing} | lengths
+    return {"units": model.units, **_observer(own, "", values), **lengths}
 
 
 def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
     _check_head(data)
-    require_kernels(data["geneos"])
+    require_kernels([*data["geneos"], *data.get("first", {"geneos": []})["geneos"]])
     geneos = [entry["kernel"] for entry in data["geneos"]]
     version = data["format_version"]
     model: GeneoModel
@@ -209,21 +229,34 @@ def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
         model = SceneNet(geneos, _size(data))
     else:
         lengths = dict(data["field" if version == FIELD_VERSION else "metric"])
-        if version != METRIC_VERSION:
+        if version in (FIELD_VERSION, SEARCHED_VERSION):
             lengths["numbers"] = "searched"
-        model = MetricSceneNet(geneos, MetricSettings(**lengths))
+        metric = MetricSettings(**lengths)
+        first = None
+        if "first" in data:
+            kernels = [entry["kernel"] for entry in data["first"]["geneos"]]
+            first = MetricSceneNet(kernels, metric)
+        model = MetricSceneNet(geneos, metric, first=first)
         said = data.get("evidence", {})
         model.evidence = {name: Evidence(**found) for name, found in said.items()}
-    numbers = {
-        f"{entry['name']}.{symbol}": float(parameter["value"])
-        for entry in data["geneos"]
-        for symbol, parameter in entry["parameters"].items()
-    }
-    mixing = {f"lambda.{name}": float(w) for name, w in data["mixing_weights"].items()}
-    model.set_shape_parameters(numbers | mixing)
+    numbers = _read_numbers(data, "")
+    if "first" in data:
+        numbers |= _read_numbers(data["first"], "first.")
+    model.set_shape_parameters(numbers)
     card = _card(data)
     _require_finite(model, card)
     return model.at(model.observed_size(card.voxel_size)), card
+
+
+def _read_numbers(observer: Mapping[str, Any], prefix: str) -> dict[str, float]:
+    """The numbers of ``_observer``, by name."""
+    shapes = {
+        f"{prefix}{entry['name']}.{symbol}": float(parameter["value"])
+        for entry in observer["geneos"]
+        for symbol, parameter in entry["parameters"].items()
+    }
+    weights = observer["mixing_weights"].items()
+    return shapes | {f"{prefix}lambda.{name}": float(weight) for name, weight in weights}
 
 
 def _read_cnn(path: Path) -> tuple[CNN, ModelCard]:
@@ -279,9 +312,14 @@ def _require_finite(model: VoxelModel, card: ModelCard) -> None:
             place = wrong[0].tolist()
             value = float(tensor[tuple(place)])
             raise InputError(f"{name}{place or ''} is {value}, not a finite number")
+    sampled = model.at(model.observed_size(card.voxel_size))
     with torch.no_grad():
-        kernel, _ = model.at(model.observed_size(card.voxel_size)).observer()
-    if not torch.isfinite(kernel).all():
+        kernels = (
+            [stage.kernels() for _, stage in sampled.stages()]
+            if isinstance(sampled, GeneoModel)
+            else [sampled.observer()[0]]
+        )
+    if not all(bool(torch.isfinite(kernel).all()) for kernel in kernels):
         raise InputError("the kernel that follows from the numbers of the model is not finite")
 
 
@@ -290,7 +328,7 @@ def _check_head(data: Mapping[str, Any]) -> None:
         raise InputError(
             "not a model file of scenenet", remedy="Name a file that scenenet train wrote"
         )
-    readable = (FORMAT_VERSION, FIELD_VERSION, SEARCHED_VERSION, METRIC_VERSION)
+    readable = (FORMAT_VERSION, FIELD_VERSION, SEARCHED_VERSION, METRIC_VERSION, COMPOSED_VERSION)
     if data["format_version"] not in readable:
         raise InputError(
             f"model format {data['format_version']}; this version reads formats "

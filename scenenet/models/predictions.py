@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from scenenet.convolution.coarsening import block_edge, coarsened
+from scenenet.convolution.coarsening import coarsened
 from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.convolution.cross_section import Section, strongest
 from scenenet.convolution.observer import count_reached
@@ -30,6 +30,10 @@ def threshold_curve(
     if isinstance(model, MetricSceneNet):
         return curve_of(model, prepare_crops(model, samples, measurement))
     total = ThresholdCurve.empty()
+    if not model.linear:
+        for sample in samples:
+            total += ThresholdCurve.of(*probabilities(model, sample, measurement))
+        return total
     with torch.no_grad():
         kernel, bias = model.observer()
         for start in range(0, len(samples), EVALUATED_AT_ONCE):
@@ -59,7 +63,7 @@ def volumes(model: VoxelModel, occupancy: Occupancy, voxel_size: float) -> np.nd
     with torch.no_grad():
         if not isinstance(model, MetricSceneNet):
             return model(occupancy).numpy()
-        observed, row = coarsened(occupancy, block_edge(voxel_size))
+        observed, row = coarsened(occupancy, model.block_edge(voxel_size))
         blocks = model.at(model.observed_size(voxel_size))(observed).numpy().reshape(-1)
     volume = np.zeros((len(occupancy), *occupancy.shape), np.float32)
     volume.reshape(-1)[occupancy.flat()] = blocks[observed.flat()[row]]
@@ -74,7 +78,8 @@ class PreparedCrop:
     Attributes:
         observed: its voxels, or blocks of voxels if its grid is fine.
         voxel_size: m, edge of these voxels or blocks.
-        section: the cross-section of each of them (``scenenet.convolution.cross_section``).
+        section: the cross-section of each of them (``scenenet.convolution.cross_section``); None
+            for a model that is not linear.
         row: (M,) row in ``observed`` of each occupied voxel of the crop.
         tower: (M,) bool, which occupied voxels are labelled tower.
         n_voxels: number of voxels of the crop, empty ones included.
@@ -82,7 +87,7 @@ class PreparedCrop:
 
     observed: Occupancy
     voxel_size: float
-    section: Section
+    section: Section | None
     row: np.ndarray
     tower: np.ndarray
     n_voxels: int
@@ -95,20 +100,23 @@ def prepare_crops(
     crops = []
     for sample in samples:
         occupancy, _ = batch([sample], measurement)
-        edge = block_edge(sample.grid.voxel_size)
+        edge = model.block_edge(sample.grid.voxel_size)
         observed, row = coarsened(occupancy, edge)
         size = edge * sample.grid.voxel_size
-        section = model.at(size).section(observed)
+        section = model.at(size).section(observed) if model.linear else None
         crops.append(PreparedCrop(observed, size, section, row, sample.tower, sample.grid.n_voxels))
     return crops
 
 
 def occupied_probabilities(model: MetricSceneNet, crop: PreparedCrop) -> np.ndarray:
     """Probability of each occupied voxel, (M,) float32; empty voxels have probability 0."""
-    kernel, _ = model.at(crop.voxel_size).observer()
-    section = crop.section
-    observed = convolve_at_voxels(crop.observed, kernel.detach()[None], section.at)[0].numpy()
-    highest = observed[strongest(observed, section.starts, section.rows)]
+    model, section = model.at(crop.voxel_size), crop.section
+    if section is None:
+        highest = model.responder()(crop.observed).sum(dim=0).numpy()
+    else:
+        kernel, _ = model.observer()
+        observed = convolve_at_voxels(crop.observed, kernel.detach()[None], section.at)[0].numpy()
+        highest = observed[strongest(observed, section.starts, section.rows)]
     return np.tanh(np.maximum(highest, 0))[crop.row]
 
 

@@ -54,7 +54,14 @@ class SceneNet(GeneoModel):
         return torch.stack([*free, last])
 
     def kernels(self) -> Tensor:
-        return self._sampled(Lattice.of_size(self.kernel_size))
+        lattice = Lattice.of_size(self.kernel_size)
+        return torch.stack(
+            [self.kernel_of(name).sample(lattice, self.shape_of(name)) for name in self.names]
+        )
+
+    def orbits(self) -> list[Tensor]:
+        lattice = Lattice.of_size(self.kernel_size)
+        return [self.kernel_of(name).orbit(lattice, self.shape_of(name)) for name in self.names]
 
     def unit_of(self, parameter: ShapeParameter) -> str:
         return parameter.unit

@@ -106,11 +106,27 @@ class MetricSettings(Settings):
         "above 1 because models find more false positives on other data than on their training "
         "crops",
     )
+    observed: float = Field(
+        1.0,
+        ge=0.1,
+        le=2.0,
+        description="m, edge of the blocks of voxels in which a finer grid is observed: a metre "
+        "for towers, less for what is thinner and closer together",
+    )
     whole_towers: bool = Field(
         True,
         description="predict all voxels of detected towers, bodies included "
         "(docs/method/detection.md); false predicts the voxels at or above tau, as in the thesis",
     )
+
+    @model_serializer(mode="wrap")
+    def _without_new(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Settings of later versions stand in records only where they differ from what every
+        earlier version did, so that the records of its models stay the same."""
+        raw: dict[str, Any] = dump(self)
+        if self.observed == type(self).model_fields["observed"].default:
+            raw.pop("observed", None)
+        return raw
 
 
 class SearchSettings(Settings):
@@ -184,8 +200,8 @@ class TrainingSettings(Settings):
 
 
 UNUSED: Mapping[str, tuple[str, ...]] = {
-    "cnn": ("protocol", "metric", "search", "geneos"),
-    "thesis": ("metric", "search", "n_kernels"),
+    "cnn": ("protocol", "metric", "search", "geneos", "first"),
+    "thesis": ("metric", "search", "n_kernels", "first"),
     "operational": ("training", "kernel_size", "n_kernels"),
 }
 """Settings without effect, for a CNN and for a SCENE-Net of each protocol."""
@@ -216,6 +232,11 @@ class ModelSettings(Settings):
     search: SearchSettings = SearchSettings()
     geneos: tuple[Kernel, ...] = Field(
         THESIS_GENEOS, min_length=1, description="kernels of a SCENE-Net; a name may be repeated"
+    )
+    first: tuple[Kernel, ...] = Field(
+        (),
+        description="kernels of a first observer, whose probability is the measurement phi of the "
+        "others; none: phi is measured in points (docs/method/observers.md)",
     )
     n_kernels: int = Field(3, ge=1, description="kernels of a CNN")
     kernel_size: KernelSize = Field((9, 9, 9), description="(kz, ky, kx) in voxels")
@@ -260,9 +281,13 @@ class ModelSettings(Settings):
     @model_serializer(mode="wrap")
     def _effective(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
         """Only the settings with an effect, so that records of a model contain no others. The
-        target is left out where it is the tower, so that records of earlier versions stay valid."""
+        target is left out where it is the tower, and a first observer where there is none, so that
+        records of earlier versions stay valid."""
         raw = dump(self)
-        usual = {"target"} if self.finds.is_tower else set()
+        usual = {
+            *(["target"] if self.finds.is_tower else []),
+            *([] if self.first else ["first"]),
+        }
         return {name: raw[name] for name in raw if name not in {*unused_settings(raw), *usual}}
 
     @classmethod

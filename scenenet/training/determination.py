@@ -36,20 +36,27 @@ def evidence(
     fixed = model.fixed_numbers()
     values = model.shape_parameters()
     best = score()
-    for name in model.names:
-        for parameter in model.parameters_of(name):
-            label = f"{name}.{parameter.name}"
-            bounds, value = model.bounds_of(parameter), values[label]
-            if label in measured:
-                between = measured[label].low, measured[label].high
-                found[label] = Evidence.of("points", value, between, bounds)
-            elif label in fixed:
-                found[label] = Evidence.of("fixed", value, (value, value), bounds)
-            else:
-                between = _profile(model, label, bounds, best, score)
-                found[label] = Evidence.of("score", value, between, bounds)
-    for name in model.names if len(model.names) > 1 else ():
-        label = f"lambda.{name}"
+    shapes = [
+        (f"{prefix}{name}.{parameter.name}", model.bounds_of(parameter))
+        for prefix, stage in model.stages()
+        for name, parameter in stage.shape_list()
+    ]
+    for label, bounds in shapes:
+        value = values[label]
+        if label in measured:
+            between = measured[label].low, measured[label].high
+            found[label] = Evidence.of("points", value, between, bounds)
+        elif label in fixed:
+            found[label] = Evidence.of("fixed", value, (value, value), bounds)
+        else:
+            between = _profile(model, label, bounds, best, score)
+            found[label] = Evidence.of("score", value, between, bounds)
+    weights = [
+        f"{prefix}lambda.{name}"
+        for prefix, stage in model.stages()
+        for name in (stage.names if len(stage.names) > 1 else ())
+    ]
+    for label in weights:
         between = _profile(model, label, WEIGHTS, best, score)
         found[label] = Evidence.of("score", values[label], between, WEIGHTS)
     model.set_shape_parameters(values)
@@ -94,10 +101,11 @@ def _profile(
 def _changed(values: Mapping[str, float], label: str, value: float) -> dict[str, float]:
     """All numbers with another value of one."""
     changed = dict(values)
-    if label.startswith("lambda."):
+    prefix, found, _ = label.rpartition("lambda.")
+    if found:
         others = 1 - values[label]
         for other in values:
-            if other.startswith("lambda.") and others > 0:
+            if other.startswith(f"{prefix}lambda.") and others > 0:
                 changed[other] *= (1 - value) / others
     changed[label] = value
     return changed

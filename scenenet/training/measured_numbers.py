@@ -75,12 +75,10 @@ class FreeNumbers:
 
     def __init__(self, model: MetricSceneNet, measured: Mapping[str, Measured]) -> None:
         kept = set(measured) | set(model.fixed_numbers())
-        names = [
-            f"{name}.{parameter.name}"
-            for name in model.names
-            for parameter in model.parameters_of(name)
-        ]
-        names += [f"lambda.{name}" for name in model.names[:-1]]
+        names = []
+        for prefix, stage in model.stages():
+            names += [f"{prefix}{name}.{p.name}" for name, p in stage.shape_list()]
+            names += [f"{prefix}lambda.{name}" for name in stage.names[:-1]]
         self.model = model
         self._free = np.array([name not in kept for name in names], bool)
         self.size = max(2, int(self._free.sum()))

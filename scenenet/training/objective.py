@@ -31,8 +31,9 @@ def scorer(free: FreeNumbers, crops: Sequence[PreparedCrop]) -> Score:
 
 def draws(model: MetricSceneNet, n: int, rng: np.random.Generator) -> np.ndarray:
     """(n, P) sets of numbers over the whole ranges; mixing weights uniform over all mixtures."""
-    n_mixing = len(model.names) - 1
-    share = rng.uniform(0.03, 0.97, (n, model.n_parameters() - n_mixing))
-    shapes = np.log(share / (1 - share))
-    weights = np.maximum(rng.dirichlet(np.ones(n_mixing + 1), n), 1e-3)
-    return np.concatenate([shapes, np.log(weights[:, :-1] / weights[:, -1:])], axis=1)
+    drawn = []
+    for _, stage in model.stages():
+        share = rng.uniform(0.03, 0.97, (n, len(stage.shape_list())))
+        weights = np.maximum(rng.dirichlet(np.ones(len(stage.names)), n), 1e-3)
+        drawn += [np.log(share / (1 - share)), np.log(weights[:, :-1] / weights[:, -1:])]
+    return np.concatenate(drawn, axis=1)

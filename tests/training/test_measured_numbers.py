@@ -204,6 +204,6 @@ def test_a_file_from_before_numbers_were_measured_reads_back(tmp_path):
     again, _ = read_model(tmp_path / "old.json")
     assert again.evidence == {}
     torch.testing.assert_close(again.observer()[0], model.at(0.9).observer()[0])
-    (tmp_path / "old.json").write_text(json.dumps(written | {"format_version": 5}))
-    with pytest.raises(InputError, match="model format 5"):
+    (tmp_path / "old.json").write_text(json.dumps(written | {"format_version": 6}))
+    with pytest.raises(InputError, match="model format 6"):
         read_model(tmp_path / "old.json")

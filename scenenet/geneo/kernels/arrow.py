@@ -11,7 +11,6 @@ from torch import Tensor
 from scenenet.geneo.kernel import (
     BODY_RADIUS,
     GeneoKernel,
-    Lattice,
     ShapeParameter,
     column,
     gaussian_shell,
@@ -20,6 +19,7 @@ from scenenet.geneo.kernel import (
     shell_sigma,
     zero_sum,
 )
+from scenenet.geneo.lattice import Lattice
 from scenenet.geneo.registry import register
 from scenenet.geneo.sentences import Numbers, Reference, m, shell
 

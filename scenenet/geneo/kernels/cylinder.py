@@ -9,12 +9,12 @@ from torch import Tensor
 from scenenet.geneo.kernel import (
     BODY_RADIUS,
     GeneoKernel,
-    Lattice,
     gaussian_shell,
     seen_shell,
     shell_sigma,
     zero_sum,
 )
+from scenenet.geneo.lattice import Lattice
 from scenenet.geneo.registry import register
 from scenenet.geneo.sentences import Numbers, Reference, shell_width
 

@@ -9,12 +9,12 @@ from torch import Tensor
 
 from scenenet.geneo.kernel import (
     GeneoKernel,
-    Lattice,
     ShapeParameter,
     gaussian_shell,
     per_support,
     shell_sigma,
 )
+from scenenet.geneo.lattice import Lattice
 from scenenet.geneo.registry import register
 from scenenet.geneo.sentences import Numbers, Reference, m, shell_width
 

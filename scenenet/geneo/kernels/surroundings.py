@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
-from scenenet.geneo.kernel import GeneoKernel, Lattice, per_support
+from scenenet.geneo.kernel import GeneoKernel, per_support
+from scenenet.geneo.lattice import Lattice
 from scenenet.geneo.registry import register
 
 

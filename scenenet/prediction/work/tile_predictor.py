@@ -17,7 +17,6 @@ from scenenet.prediction.work.tiling import EDGE, Tile, TileSpool, code_of
 from scenenet.prediction.work.work_file import WorkFile
 
 if TYPE_CHECKING:
-    import torch
 
     from scenenet.dataset.voxels import Measurement
     from scenenet.models.base import VoxelModel
@@ -105,17 +104,10 @@ class TilePredictor:
         """
         import torch
 
-        from scenenet.models.geneo_model import GeneoModel
-
         self.model = model.at(voxel_size)
         self._fullest = fullest if measurement == "density" else None
-        self._bias: torch.Tensor | None = None
         with torch.no_grad():
-            if isinstance(self.model, GeneoModel):
-                self._kernels = self.model.weighted_kernels()
-            else:
-                kernel, self._bias = self.model.observer()
-                self._kernels = kernel[None]
+            self._responses = self.model.responder()
 
     def __call__(
         self, spool: TileSpool, tiles: Sequence[Tile]
@@ -143,14 +135,12 @@ class TilePredictor:
         ])  # fmt: skip
         with torch.no_grad():
             # The shares are those of the voxel that the maximum of the cross-section is from.
-            parts = self.model.responses(occupancy, self._kernels)[:, torch.from_numpy(inner)]
+            parts = self._responses(occupancy)[:, torch.from_numpy(inner)]
+            observed = parts.sum(dim=0)
             if isinstance(self.model, GeneoModel):
-                observed = parts.sum(dim=0)
                 weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
                 shares = (parts / weight).T.contiguous().numpy()
             else:
-                observed = parts[0]
-                observed = observed if self._bias is None else observed + self._bias
                 shares = np.empty((len(inner), 0), np.float32)
             probability = torch.relu(torch.tanh(observed)).numpy()
         ends = np.cumsum([len(tile.voxel) for tile in tiles])[:-1]

@@ -174,14 +174,21 @@ class GeneoKernel(ABC):
         return self.turns > 1 or self.slopes != (0.0,)
 
     def orbit(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
-        """The kernel in all its directions, (turns * slopes, kz, ky, kx)."""
-        return torch.stack(
-            [
-                self.sample(lattice.turned(2 * math.pi * turn / self.turns, slope), shape)
-                for turn in range(self.turns)
-                for slope in self.slopes
-            ]
-        )
+        """The kernel in all its directions, (turns * slopes, kz, ky, kx).
+
+        On a lattice that a quarter turn leaves unchanged, the other quarters are turned copies, so
+        that the operator is equivariant under quarter turns to the last digit.
+        """
+        _, ky, kx = lattice.size
+        quarters = 4 if self.turns % 4 == 0 and ky == kx and ky % 2 == 1 else 1
+        first = [
+            self.sample(lattice.turned(2 * math.pi * turn / self.turns, slope), shape)
+            for turn in range(self.turns // quarters)
+            for slope in self.slopes
+        ]
+        quarter = torch.stack(first)
+        # Rows are y and columns x, so a turn from x towards y is a turn from columns to rows.
+        return torch.cat([torch.rot90(quarter, -n, (2, 3)) for n in range(quarters)])
 
 
 def zero_sum(kernel: Tensor, inside: Tensor | None = None) -> Tensor:

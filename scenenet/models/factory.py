@@ -17,8 +17,5 @@ def new_model(settings: ModelSettings, seed: int) -> VoxelModel:
     if settings.kind == "cnn":
         return CNN(settings.n_kernels, settings.kernel_size, generator=generator)
     if settings.protocol == "operational":
-        first = None
-        if settings.first:
-            first = MetricSceneNet(settings.first, settings.metric, generator=generator)
-        return MetricSceneNet(settings.geneos, settings.metric, first=first, generator=generator)
+        return MetricSceneNet.composed(settings.geneos, settings.first, settings.metric, generator)
     return SceneNet(settings.geneos, settings.kernel_size, generator=generator)

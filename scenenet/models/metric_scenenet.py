@@ -106,6 +106,22 @@ class MetricSceneNet(GeneoModel):
             self._store(name, parameter, value)
         self._discretise(1.0)
 
+    @classmethod
+    def composed(
+        cls,
+        geneos: Sequence[str],
+        first: Sequence[str],
+        metric: MetricSettings,
+        generator: torch.Generator | None = None,
+    ) -> Self:
+        """A new model whose first observer has the kernels ``first``; none if there are no such
+        kernels. The first observer answers for each voxel itself, not for a cross-section."""
+        before = None
+        if first:
+            alone = metric.model_copy(update={"section_radius": 0.0, "section_above": 0.0})
+            before = cls(first, alone, generator=generator)
+        return cls(geneos, metric, first=before, generator=generator)
+
     def _initial_shape(self, parameter: ShapeParameter, drawn: Tensor) -> Tensor:
         return torch.logit(0.03 + 0.94 * drawn)
 
@@ -177,7 +193,9 @@ class MetricSceneNet(GeneoModel):
     @property
     def section_radius(self) -> float:
         """m, radius of the cross-section: the body with its corners."""
-        return max(self.metric.section_radius, math.sqrt(2) * self.body_radius() + CORNER_M)
+        body = self.body_radius()
+        corners = math.sqrt(2) * body + CORNER_M if body else 0.0
+        return max(self.metric.section_radius, corners)
 
     def extent_of(self, name: str) -> Extent:
         """m, how far the GENEO called ``name`` reaches."""

@@ -231,12 +231,9 @@ def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
         lengths = dict(data["field" if version == FIELD_VERSION else "metric"])
         if version in (FIELD_VERSION, SEARCHED_VERSION):
             lengths["numbers"] = "searched"
-        metric = MetricSettings(**lengths)
-        first = None
-        if "first" in data:
-            kernels = [entry["kernel"] for entry in data["first"]["geneos"]]
-            first = MetricSceneNet(kernels, metric)
-        model = MetricSceneNet(geneos, metric, first=first)
+        before = data["first"]["geneos"] if "first" in data else ()
+        first = [entry["kernel"] for entry in before]
+        model = MetricSceneNet.composed(geneos, first, MetricSettings(**lengths))
         said = data.get("evidence", {})
         model.evidence = {name: Evidence(**found) for name, found in said.items()}
     numbers = _read_numbers(data, "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +49,7 @@ def probabilities(
     if isinstance(model, MetricSceneNet):
         (crop,) = prepare_crops(model, [sample], measurement)
         with torch.no_grad():
-            return sample.spread(occupied_probabilities(model, crop))
+            return sample.spread(Answers(model)(crop))
     occupancy, towers = batch([sample], measurement)
     with torch.no_grad():
         probability = model(occupancy).numpy().reshape(-1)
@@ -108,24 +108,35 @@ def prepare_crops(
     return crops
 
 
-def occupied_probabilities(model: MetricSceneNet, crop: PreparedCrop) -> np.ndarray:
-    """Probability of each occupied voxel, (M,) float32; empty voxels have probability 0."""
-    model, section = model.at(crop.voxel_size), crop.section
-    if section is None:
-        highest = model.responder()(crop.observed).sum(dim=0).numpy()
-    else:
-        kernel, _ = model.observer()
-        observed = convolve_at_voxels(crop.observed, kernel.detach()[None], section.at)[0].numpy()
-        highest = observed[strongest(observed, section.starts, section.rows)]
-    return np.tanh(np.maximum(highest, 0))[crop.row]
+class Answers:
+    """The probabilities of a model with its present numbers, whose kernels are sampled once for
+    each size of voxels."""
+
+    def __init__(self, model: MetricSceneNet) -> None:
+        self._model = model
+        self._responders: dict[float, Callable[[Occupancy], torch.Tensor]] = {}
+
+    def __call__(self, crop: PreparedCrop) -> np.ndarray:
+        """Probability of each occupied voxel, (M,) float32; empty voxels have probability 0."""
+        model, section = self._model.at(crop.voxel_size), crop.section
+        if section is None:
+            if crop.voxel_size not in self._responders:
+                self._responders[crop.voxel_size] = model.responder()
+            highest = self._responders[crop.voxel_size](crop.observed).sum(dim=0).numpy()
+        else:
+            kernel = model.observer()[0].detach()[None]
+            observed = convolve_at_voxels(crop.observed, kernel, section.at)[0].numpy()
+            highest = observed[strongest(observed, section.starts, section.rows)]
+        return np.tanh(np.maximum(highest, 0))[crop.row]
 
 
 def curve_of(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> ThresholdCurve:
     """Scores at every threshold over all voxels, empty ones included."""
     total = ThresholdCurve.empty()
     with torch.no_grad():
+        probabilities_of = Answers(model)
         for crop in crops:
-            curve = ThresholdCurve.of(occupied_probabilities(model, crop), crop.tower)
+            curve = ThresholdCurve.of(probabilities_of(crop), crop.tower)
             curve.false[0] += crop.n_voxels - len(crop.tower)
             total += curve
     return total

@@ -14,8 +14,8 @@ from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.metrics.voxel_scores import confusion
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import (
+    Answers,
     curve_of,
-    occupied_probabilities,
     prepare_crops,
     probabilities,
     volumes,
@@ -107,7 +107,7 @@ def test_prepared_crops_give_the_probabilities_of_the_model(scene, voxel_size):
     net = model(3)
     (ready,) = prepare_crops(net, [sample], "presence")
     assert ready.voxel_size == 1.0
-    occupied = occupied_probabilities(net, ready)
+    occupied = Answers(net)(ready)
     probability, truth = probabilities(net, sample, "presence")
     np.testing.assert_array_equal(probability[sample.index], occupied)
     assert probability.sum() == pytest.approx(occupied.sum(), rel=1e-5)

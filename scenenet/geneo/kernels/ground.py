@@ -11,8 +11,8 @@ from scenenet.geneo.lattice import Lattice
 from scenenet.geneo.registry import register
 from scenenet.geneo.sentences import Numbers, Reference, m
 
-ASIDE_VOXELS = 1.2
-"""Half width of the strip in voxels: with its neighbours, a line of voxels in any direction."""
+ASIDE_VOXELS = 1.5
+"""Half width of the strip in voxels: a line of voxels in any direction, and its neighbours."""
 
 
 def _reach(n: Numbers, reference: Reference) -> str:
@@ -66,7 +66,7 @@ class Ground(GeneoKernel):
             return ((limit - distance.abs()) / step + 0.5).clamp(0, 1)
 
         strip = within(lattice.x, shape["r"]) * within(lattice.z, shape["h"])
-        strip = strip * within(lattice.y, (ASIDE_VOXELS - 0.5) * step)
+        strip = strip * within(lattice.y, ASIDE_VOXELS * step)
         return -strip * (step / (2 * shape["r"] + step))
 
     def extent(self, shape: Mapping[str, float]) -> Extent:

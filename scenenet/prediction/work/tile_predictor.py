@@ -17,7 +17,6 @@ from scenenet.prediction.work.tiling import EDGE, Tile, TileSpool, code_of
 from scenenet.prediction.work.work_file import WorkFile
 
 if TYPE_CHECKING:
-
     from scenenet.dataset.voxels import Measurement
     from scenenet.models.base import VoxelModel
     from scenenet.models.model_file import ModelCard

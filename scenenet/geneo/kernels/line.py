@@ -44,7 +44,7 @@ class Line(GeneoKernel):
             24.0,
             "voxel",
             "length of a conductor that a voxel must be the end of",
-            metric=(4.0, 16.0),
+            metric=(4.0, 12.0),
             sentence=_length,
         ),
         ShapeParameter(

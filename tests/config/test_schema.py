@@ -239,7 +239,9 @@ def test_a_cnn_of_protocol_operational_is_refused_with_what_to_write_instead():
 def test_an_unknown_kernel_is_refused_with_the_nearest_name():
     model = {"name": "m", "kind": "scenenet", "geneos": ["arrow", "cylindre"]}
     message = complaint(models=[model])
-    assert "models[0].geneos[1]: 'cylindre' is none of the kernels arrow, canopy, cylinder" in message
+    assert (
+        "models[0].geneos[1]: 'cylindre' is none of the kernels arrow, canopy, cylinder" in message
+    )
     assert "did you mean 'cylinder'?" in message
 
 

@@ -75,8 +75,7 @@ def test_the_sphere_is_negative_beyond_the_length_given_for_omega():
     shape = {
         name: torch.tensor(VALUES[f"negative_sphere.{name}"]) for name in ("r", "sigma", "omega")
     }
-    lattice = Lattice.of_size((1, 1, 61))
-    fine = Lattice((1, 1, 61), 0.1 * lattice.z, 0.01 * lattice.planar_squared)
+    fine = Lattice.of_extent((1, 1, 61), radius=3.0, voxel_size=0.1)
     kernel = kernel_named("negative_sphere").sample(fine, shape)[0, 0]
     far = fine.planar_squared[0, 0].sqrt() > beyond + 0.1
     assert bool((kernel[far] < 0).all())

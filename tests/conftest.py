@@ -14,6 +14,9 @@ from types import ModuleType
 # this when they are loaded.
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+# numba has threads of its own. While one of them waits for the others it would keep a core busy,
+# which takes most of the time of a small loop where another process has that core.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import hypothesis
 import numpy as np

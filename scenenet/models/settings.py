@@ -59,8 +59,8 @@ def _known_kernel(name: str) -> str:
         known |= set(registry.kernel_names())
     if name not in known:
         close = difflib.get_close_matches(name, sorted(known), n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else ""
-        raise ValueError(f"{name!r} is none of the kernels {', '.join(sorted(known))}{hint}")
+        hint = f"did you mean {close[0]!r}?" if close else "provide the file of another kernel"
+        raise ValueError(f"{name!r} is none of the kernels {', '.join(sorted(known))}; {hint}")
     return name
 
 

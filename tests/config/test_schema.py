@@ -259,7 +259,8 @@ def test_the_kernels_of_the_settings_are_those_of_the_registry():
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     message, names = shown.stdout.splitlines()
-    assert message == f"Value error, 'none' is none of the kernels {names}"
+    shown = f"Value error, 'none' is none of the kernels {names}; "
+    assert message == f"{shown}provide the file of another kernel"
 
 
 @pytest.mark.parametrize("edge", [0, 65])

@@ -15,7 +15,7 @@ from kept_runs import Values, read_figures
 
 from scenenet.cli.app import app
 from scenenet.config.schema import Config
-from scenenet.geneo import registry
+from scenenet.geneo import kernel_of_file, registry
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import ModelSettings
 from scenenet.synthetic.settings import SyntheticSettings
@@ -37,11 +37,14 @@ def _commands(text: str) -> Iterator[str]:
         yield from block.splitlines()
 
 
-def test_the_kernel_of_the_guide_can_be_added_unchanged(project_root, monkeypatch):
+def test_the_kernel_of_the_guide_can_be_added_unchanged(project_root, monkeypatch, tmp_path):
     registry.kernel_names()  # those there are stay known when the copy is dropped again
     monkeypatch.setattr(registry, "_KERNELS", dict(registry._KERNELS))
     text = (project_root / "docs" / "guides" / "kernels.md").read_text()
-    exec(re.search(r"```python\n(.*?)```", text, re.DOTALL)[1], {"__name__": "guide"})
+    kernel = re.search(r"```python\n(.*?)```", text, re.DOTALL)[1]
+    (tmp_path / "slab.py").write_text(kernel)
+    assert kernel_of_file(tmp_path / "slab.py").name == "slab"
+    exec(kernel, {"__name__": "guide"})
     model = SceneNet(["cylinder", "arrow", "slab", "negative_sphere"])
     assert model.n_parameters() == 13
     assert abs(float(model.kernels()[2].sum().detach())) < 1e-3

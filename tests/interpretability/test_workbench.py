@@ -8,9 +8,10 @@ import torch
 
 from scenenet.convolution.convolve import convolve
 from scenenet.convolution.occupancy import Occupancy
+from scenenet.interpretability.geneo_properties import certify
 from scenenet.interpretability.workbench.description import KernelFacts, side_view, top_view
+from scenenet.interpretability.workbench.moved_scenes import measured_equivariance
 from scenenet.interpretability.workbench.one_kernel import OneKernel
-from scenenet.interpretability.workbench.trial import measured_equivariance
 
 
 def test_the_facts_of_a_kernel_are_those_of_its_values():
@@ -70,5 +71,24 @@ def test_a_kernel_that_looks_to_one_side_is_not_equivariant(tmp_path, monkeypatc
     monkeypatch.setenv(VARIABLE, str(path))
     east, round_one = OneKernel("east"), OneKernel("cylinder")
     assert KernelFacts.of(east.sampled(), 1.0).quarter_turn_error == 1.0
-    assert measured_equivariance(east).quarter_turn > 0.1
-    assert measured_equivariance(round_one).quarter_turn < 1e-5
+    assert measured_equivariance(east.answers, 1.0).quarter_turn > 0.1
+    assert measured_equivariance(round_one.answers, 1.0).quarter_turn < 1e-5
+
+
+def test_equivariance_is_what_the_certificate_of_the_same_observer_says():
+    chosen = OneKernel("cylinder", {"r": 0.4})
+    found = measured_equivariance(chosen.answers, 1.0)
+    expected = certify(chosen.model)
+    worst = max((t for t in expected.turns if t.degrees % 90), key=lambda t: t.mean_h)
+    assert found.translation < 1e-5 and expected.translation_error < 1e-5
+    assert (found.between, found.between_degrees) == (
+        pytest.approx(worst.mean_h, rel=1e-3),
+        worst.degrees,
+    )
+    assert found.half_voxel == pytest.approx(expected.half_voxel.mean_h, rel=1e-3)
+
+
+def test_an_operator_that_knows_where_it_is_is_not_equivariant():
+    found = measured_equivariance(lambda scene: scene.index % scene.shape[2] + 0.0, 1.0)
+    assert found.translation > 0.05
+    assert found.quarter_turn > 0.5

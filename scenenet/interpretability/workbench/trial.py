@@ -11,10 +11,9 @@ import numpy as np
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import in_file
 from scenenet.dataset.voxels import VoxelGrid
-from scenenet.interpretability.certificate import SCENE
-from scenenet.interpretability.geneo_properties import certify
 from scenenet.interpretability.workbench.description import KernelFacts, ParameterDescription
 from scenenet.interpretability.workbench.description import parameters_of as described
+from scenenet.interpretability.workbench.moved_scenes import Equivariance, measured_equivariance
 from scenenet.interpretability.workbench.one_kernel import OneKernel
 from scenenet.pointcloud import PointCloud, read, survey_in_metres
 from scenenet.pointcloud.class_schemes import SCHEMES
@@ -61,28 +60,6 @@ class Place:
     response: float
     code: int
     name: str
-
-
-@dataclass(frozen=True)
-class Equivariance:
-    """How far the response moves with the scene, on ``scene``.
-
-    Attributes:
-        scene: describes the scene.
-        translation: error under a shift by whole voxels, as a share of the largest response.
-        quarter_turn: the same for the worst quarter turn about z.
-        between: mean difference of the response for the worst other angle, as a share of its
-            standard deviation; ``between_degrees`` is that angle.
-        half_voxel: the same for a shift by half a voxel, which moves points into other voxels as
-            every angle does.
-    """
-
-    scene: str
-    translation: float
-    quarter_turn: float
-    between: float
-    between_degrees: float
-    half_voxel: float
 
 
 @dataclass(frozen=True)
@@ -144,27 +121,12 @@ def try_kernel(chosen: OneKernel, survey: str | Path, codes: str | None = None) 
         voxels=len(index),
         parameters=described(chosen),
         facts=KernelFacts.of(chosen.sampled(), chosen.voxel_size),
-        equivariance=measured_equivariance(chosen),
+        equivariance=measured_equivariance(chosen.answers, chosen.voxel_size),
         classes=_by_class(answers[rows], cloud.classification, titles),
         places=_places(answers, grid.centres(index), rows, cloud, titles),
         xyz=cloud.xyz,
         codes=cloud.classification,
         responses=answers[rows],
-    )
-
-
-def measured_equivariance(chosen: OneKernel) -> Equivariance:
-    """The equivariance of the response of a kernel, on the scene of the certificates."""
-    found = certify(chosen.model, voxel_size=chosen.voxel_size)
-    others = [turn for turn in found.turns if turn.degrees and turn.degrees % 90]
-    worst = max(others, key=lambda turn: turn.mean_h)
-    return Equivariance(
-        scene=SCENE,
-        translation=found.translation_error,
-        quarter_turn=found.quarter_turn_error,
-        between=worst.mean_h,
-        between_degrees=worst.degrees or 0.0,
-        half_voxel=found.half_voxel.mean_h,
     )
 
 

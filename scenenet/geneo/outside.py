@@ -138,6 +138,8 @@ def _fault(kernel: GeneoKernel) -> str | None:
         isinstance(parameter, ShapeParameter) for parameter in parameters
     ):
         return "must have parameters, a tuple of ShapeParameter (one: (ShapeParameter(...),))"
+    if not isinstance(kernel.turns, int) or kernel.turns < 1:
+        return f"has turns = {kernel.turns!r}, which is no number of turns about z"
     names = [parameter.name for parameter in parameters]
     if len(set(names)) < len(names):
         return f"has two parameters of one name among {', '.join(names)}"
@@ -155,11 +157,14 @@ def _fault(kernel: GeneoKernel) -> str | None:
 
 def _fault_of_values(kernel: GeneoKernel) -> str | None:
     """The same for the values that it has on small lattices in voxels and in metres."""
-    for lattice in (
+    lattices = [
         Lattice.of_size(_SIZE),
         Lattice.of_extent(_SIZE, 2.0, 1.0),
         Lattice.of_extent(_SIZE, 2.0, 1.0, voxel=1.0),
-    ):
+    ]
+    if kernel.oriented:
+        lattices += [lattice.turned(0.5, max(kernel.slopes)) for lattice in lattices]
+    for lattice in lattices:
         shape = {
             p.name: torch.tensor((p.metric_range[0] * p.metric_range[1]) ** 0.5, requires_grad=True)
             for p in kernel.parameters

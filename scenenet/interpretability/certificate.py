@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from scenenet.core.errors import InputError
 from scenenet.interpretability.geneo_properties import certify
 from scenenet.interpretability.result import ModelCertificate, Statement
 from scenenet.models.model_file import read_model
@@ -28,9 +29,16 @@ def certificate(model: str | Path) -> ModelCertificate:
     A model without GENEOs has the statements of ``OF_CONVOLUTION`` only.
 
     Raises:
-        InputError: the file is not a model.
+        InputError: the file is not a model, or its observer is not one kernel.
     """
     trained, card = read_model(model)
+    if not trained.linear:
+        raise InputError(
+            "there is no certificate for this model: its response is not that of one kernel, but a "
+            "maximum over directions, or measured in the answer of another observer",
+            file=model,
+            remedy="Measure the equivariance of each of its kernels with scenenet geneo try",
+        )
     size = trained.observed_size(card.voxel_size)
     found = certify(trained, voxel_size=size, measurement=card.measurement, tau=card.tau)
     worst = max((t.mean_h for t in found.turns if t.degrees and t.degrees % 90), default=None)

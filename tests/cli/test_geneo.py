@@ -173,3 +173,16 @@ def test_a_model_is_certified(call, pole_model):
     found = json.loads(call("geneo", "certify", "--model", pole_model, "--json").out)
     assert found["kind"] == "scenenet"
     assert {"property", "thesis", "holds", "text", "value"} <= found["statements"][0].keys()
+
+
+def test_a_model_with_a_direction_is_not_certified_as_if_it_were_one_kernel(call, tmp_path):
+    from fixtures.scenes import model_card
+
+    from scenenet.models.metric_scenenet import MetricSceneNet
+    from scenenet.models.model_file import write_model
+
+    path = tmp_path / "wires.json"
+    write_model(path, MetricSceneNet(["line"]), model_card())
+    shown = call("geneo", "certify", "--model", path)
+    assert shown.code == 1
+    assert f"{path}: there is no certificate for this model" in shown.err

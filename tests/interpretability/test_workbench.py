@@ -8,6 +8,7 @@ import torch
 
 from scenenet.convolution.convolve import convolve
 from scenenet.convolution.occupancy import Occupancy
+from scenenet.geneo import kernel_named
 from scenenet.interpretability.geneo_properties import certify
 from scenenet.interpretability.workbench.description import KernelFacts, side_view, top_view
 from scenenet.interpretability.workbench.moved_scenes import measured_equivariance
@@ -17,14 +18,14 @@ from scenenet.interpretability.workbench.one_kernel import OneKernel
 def test_the_facts_of_a_kernel_are_those_of_its_values():
     kernel = torch.zeros(3, 3, 3)
     kernel[0, 1, 1], kernel[0, 1, 2], kernel[2, 0, 0] = 4.0, -4.0, 2.0
-    facts = KernelFacts.of(kernel, 0.5)
+    facts = KernelFacts.of(kernel[None], 0.5)
     assert (facts.total, facts.l1, facts.lowest, facts.highest) == (2.0, 10.0, -4.0, 4.0)
     assert facts.slice_sum == 2.0
     assert not facts.sums_to_zero
     # A quarter turn puts -4 where 0 was: the change is as large as the largest value.
     assert facts.quarter_turn_error == 1.0
     kernel[2, 0, 0] = 0.0
-    assert KernelFacts.of(kernel, 0.5).sums_to_zero
+    assert KernelFacts.of(kernel[None], 0.5).sums_to_zero
 
 
 def test_slices_are_drawn_with_up_and_north_at_the_top():
@@ -70,7 +71,7 @@ def test_a_kernel_that_looks_to_one_side_is_not_equivariant(tmp_path, monkeypatc
     )
     monkeypatch.setenv(VARIABLE, str(path))
     east, round_one = OneKernel("east"), OneKernel("cylinder")
-    assert KernelFacts.of(east.sampled(), 1.0).quarter_turn_error == 1.0
+    assert KernelFacts.of(east.orbit, 1.0).quarter_turn_error == 1.0
     assert measured_equivariance(east.answers, 1.0).quarter_turn > 0.1
     assert measured_equivariance(round_one.answers, 1.0).quarter_turn < 1e-5
 
@@ -86,6 +87,19 @@ def test_equivariance_is_what_the_certificate_of_the_same_observer_says():
         worst.degrees,
     )
     assert found.half_voxel == pytest.approx(expected.half_voxel.mean_h, rel=1e-3)
+
+
+def test_a_kernel_with_a_direction_answers_with_the_largest_of_its_orbit():
+    line = OneKernel("line")
+    kernel = kernel_named("line")
+    facts = KernelFacts.of(line.orbit, 1.0)
+    assert facts.directions == kernel.turns * len(kernel.slopes) > 1
+    assert facts.quarter_turn_error < 1e-5
+    assert KernelFacts.of(line.sampled()[None], 1.0).quarter_turn_error > 0.1
+    index = np.flatnonzero(np.random.default_rng(3).random(9 * 30 * 30) < 0.02)
+    scene = Occupancy.of_grids([index], None, (9, 30, 30))
+    every = np.stack([convolve(scene, one).reshape(-1).numpy()[index] for one in line.orbit])
+    assert np.allclose(line.answers(scene), every.max(axis=0), atol=1e-5)
 
 
 def test_an_operator_that_knows_where_it_is_is_not_equivariant():

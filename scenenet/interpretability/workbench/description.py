@@ -13,7 +13,6 @@ from scenenet.core.errors import InputError
 from scenenet.core.provided_kernels import faults, provided, source_named
 from scenenet.geneo import GeneoKernel, ShapeParameter, kernel_named, kernel_names
 from scenenet.geneo.sentences import Reference
-from scenenet.interpretability.equivariance import kernel_turn_error
 from scenenet.interpretability.geneo_properties import ROUNDING
 from scenenet.interpretability.parameter_sentences import sentence_of
 from scenenet.interpretability.workbench.one_kernel import OneKernel
@@ -51,6 +50,8 @@ class KernelDescription:
         formula: the docstring of its class.
         origin: ``built in``, the path of its file, or a package with its version.
         sums_to_zero: whether every horizontal slice is meant to sum to zero.
+        turns, slopes: directions over which the maximum is taken, as in ``GeneoKernel``; 1 and
+            (0,) for a kernel without a direction.
         parameters: its shape parameters.
     """
 
@@ -59,28 +60,34 @@ class KernelDescription:
     formula: str
     origin: str
     sums_to_zero: bool
+    turns: int
+    slopes: tuple[float, ...]
     parameters: tuple[ParameterDescription, ...]
 
 
 @dataclass(frozen=True)
 class KernelFacts:
-    """What is calculated from the values of a kernel.
+    """What is calculated from the values of a kernel, or of its orbit: all its directions.
 
     Attributes:
         voxel_size: m.
         size: (kz, ky, kx) voxels.
-        total: sum of all values.
+        directions: number of kernels in the orbit.
+        total: sum of all values; of an orbit the largest in absolute value.
         slice_sum: the largest |sum| of a horizontal slice.
         sums_to_zero: whether every slice sums to zero, but for rounding.
-        l1: sum of the absolute values: the smallest constant of non-expansivity; divided by it,
-            the response is a non-expansive operator (thesis Eq. 3.2).
+        l1: sum of the absolute values, of an orbit the largest: the smallest constant of
+            non-expansivity; divided by it, the response is a non-expansive operator (thesis
+            Eq. 3.2).
         lowest, highest: the smallest and the largest value.
         quarter_turn_error: largest change of a value under a quarter turn about z, as a share of
-            the largest value. 0 is exact equivariance under quarter turns.
+            the largest value; of an orbit against the kernel that comes closest. 0 is exact
+            equivariance under quarter turns.
     """
 
     voxel_size: float
     size: tuple[int, int, int]
+    directions: int
     total: float
     slice_sum: float
     sums_to_zero: bool
@@ -90,21 +97,31 @@ class KernelFacts:
     quarter_turn_error: float
 
     @classmethod
-    def of(cls, kernel: torch.Tensor, voxel_size: float) -> KernelFacts:
-        """The facts of a sampled kernel (kz, ky, kx)."""
-        k = kernel.double()
-        l1, slice_sum = float(k.abs().sum()), float(k.sum(dim=(1, 2)).abs().max())
+    def of(cls, orbit: torch.Tensor, voxel_size: float) -> KernelFacts:
+        """The facts of sampled kernels (n, kz, ky, kx); n is 1 for one without a direction."""
+        k = orbit.double()
+        l1 = float(k.abs().sum(dim=(1, 2, 3)).max())
+        slice_sum = float(k.sum(dim=(2, 3)).abs().max())
         return cls(
             voxel_size=voxel_size,
-            size=(k.shape[0], k.shape[1], k.shape[2]),
-            total=float(k.sum()),
+            size=(k.shape[1], k.shape[2], k.shape[3]),
+            directions=len(k),
+            total=max(k.sum(dim=(1, 2, 3)).tolist(), key=abs),
             slice_sum=slice_sum,
             sums_to_zero=slice_sum <= ROUNDING * max(l1, 1),
             l1=l1,
             lowest=float(k.min()),
             highest=float(k.max()),
-            quarter_turn_error=kernel_turn_error(k),
+            quarter_turn_error=_quarter_turn_error(k),
         )
+
+
+def _quarter_turn_error(orbit: torch.Tensor) -> float:
+    """The change of an orbit (n, kz, ky, kx), as in ``KernelFacts``; each side of a kernel is odd,
+    and ky is kx."""
+    turned = torch.rot90(orbit, 1, (2, 3))
+    nearest = [(orbit - one).abs().amax(dim=(1, 2, 3)).min() for one in turned]
+    return float(torch.stack(nearest).max()) / (float(orbit.abs().max()) or 1.0)
 
 
 def describe(name: str) -> KernelDescription:
@@ -121,6 +138,8 @@ def describe(name: str) -> KernelDescription:
         formula=inspect.cleandoc(type(kernel).__doc__ or ""),
         origin=BUILT_IN if source is None else source.where,
         sums_to_zero=kernel.sums_to_zero,
+        turns=kernel.turns,
+        slopes=kernel.slopes,
         parameters=tuple(_parameter(p, p.physical_range) for p in kernel.parameters),
     )
 

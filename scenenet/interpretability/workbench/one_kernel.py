@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 import torch
@@ -11,6 +12,7 @@ from torch import Tensor
 
 from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.convolution.occupancy import Occupancy
+from scenenet.convolution.orbit import Orbit, strongest_at_voxels
 from scenenet.core.errors import InputError
 from scenenet.geneo import ShapeParameter, kernel_named
 from scenenet.models.metric_scenenet import MetricSceneNet
@@ -76,12 +78,24 @@ class OneKernel:
         }
 
     def sampled(self) -> Tensor:
-        """The kernel (kz, ky, kx), float32, axes z (up), y, x."""
+        """The kernel (kz, ky, kx), float32, axes z (up), y, x; one with a direction points along
+        x."""
         with torch.no_grad():
             kernel: Tensor = self.model.kernels()[0]
         return kernel
 
-    def answers(self, occupancy: Occupancy) -> np.ndarray:
-        """(M,) float32, the response at each occupied voxel."""
+    @cached_property
+    def orbit(self) -> Tensor:
+        """The kernel in all its directions, (n, kz, ky, kx); n is 1 for one without a direction."""
         with torch.no_grad():
-            return convolve_at_voxels(occupancy, self.model.kernels())[0].numpy()
+            return self.model.orbits()[0]
+
+    def answers(self, occupancy: Occupancy) -> np.ndarray:
+        """(M,) float32, the response at each occupied voxel: the maximum over the orbit."""
+        if len(self.orbit) > 1:
+            return strongest_at_voxels(occupancy, self._by_position)
+        return convolve_at_voxels(occupancy, self.orbit)[0].numpy()
+
+    @cached_property
+    def _by_position(self) -> Orbit:
+        return Orbit.of(self.orbit)

@@ -52,8 +52,10 @@ def command(
 ) -> None:
     """Show a kernel: its formula, its parameters in words, its values, and what is true of it.
 
-    The slices show the values in ninths of the largest one; zero is a dot. A file that exists is
-    replaced only with --overwrite.
+    The slices show the values in ninths of the largest one; zero is a dot. A kernel with a
+    direction is shown along x.
+
+    A file that exists is replaced only with --overwrite.
     """
     from scenenet.core.outputs import Output, check_outputs
     from scenenet.interpretability.workbench.description import (
@@ -74,7 +76,7 @@ def command(
     described = describe(name)
     chosen = sampled(name, values, voxel_size, radius, above, below)
     kernel = chosen.sampled()
-    parameters, facts = parameters_of(chosen), KernelFacts.of(kernel, voxel_size)
+    parameters, facts = parameters_of(chosen), KernelFacts.of(chosen.orbit, voxel_size)
     side, (row, top) = side_view(kernel.numpy()), top_view(kernel.numpy())
     height = (row - (kernel.shape[0] - 1) // 2) * voxel_size
     if out is not None:
@@ -87,7 +89,11 @@ def command(
         "values": kernel.tolist(),
     }
     slices = ["from the side, up is up:", *side, "", f"from above, at z = {height:g} m:", *top]
-    show(data, as_json, lambda _: [*_head(described, parameters), "", *_facts(facts), "", *slices])
+    show(
+        data,
+        as_json,
+        lambda _: [*_head(described, parameters), "", *_facts(facts, described), "", *slices],
+    )
 
 
 def _head(kernel: KernelDescription, parameters: tuple[ParameterDescription, ...]) -> list[str]:
@@ -103,14 +109,21 @@ def _head(kernel: KernelDescription, parameters: tuple[ParameterDescription, ...
     return lines
 
 
-def _facts(facts: KernelFacts) -> list[str]:
+def _facts(facts: KernelFacts, kernel: KernelDescription) -> list[str]:
     size = "x".join(map(str, facts.size))
     zero = "yes" if facts.sums_to_zero else f"no, up to {facts.slice_sum:.3g}"
-    turn = facts.quarter_turn_error
+    turn, what = facts.quarter_turn_error, "the orbit" if facts.directions > 1 else "it"
+    orbit = ["the orbit, over which the answer is the largest: " + _directions(kernel)]
     return [
+        *(orbit if facts.directions > 1 else []),
         f"{size} voxels of {facts.voxel_size:g} m, from {facts.lowest:.3g} to {facts.highest:.3g}",
         f"every slice sums to zero: {zero}; total {facts.total:.3g}",
         f"constant of non-expansivity, the sum of |g|: {facts.l1:.3g}",
-        "quarter turns about z leave it unchanged: "
+        f"quarter turns about z leave {what} unchanged: "
         + ("yes" if turn <= 1e-4 else f"no, it changes by {turn:.0%} of its largest value"),
     ]
+
+
+def _directions(kernel: KernelDescription) -> str:
+    slopes = "" if len(kernel.slopes) == 1 else f", at {len(kernel.slopes)} slopes each"
+    return f"{kernel.turns} turns about z{slopes}"

@@ -36,7 +36,10 @@ VoxelSize = Annotated[
 Radius = Annotated[
     float,
     typer.Option(
-        min=0.01, max=LARGEST_LENGTH, help="Horizontal reach in m, beyond the body of a tower."
+        min=0.01,
+        max=LARGEST_LENGTH,
+        help="Horizontal reach in m, beyond the body of a tower. This and the next two have no "
+        "effect on kernels whose reach follows from their parameters.",
     ),
 ]
 Above = Annotated[float, typer.Option(min=0, max=LARGEST_LENGTH, help="Upward reach in m.")]

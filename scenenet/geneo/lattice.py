@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import torch
 from torch import Tensor
+
+KEPT = 64
+"""Lattices in metres that are kept: a search samples its kernels thousands of times on a few."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,7 @@ class Lattice:
         return cls(size, z[:, None, None], planar[None], y[None, :, None], x[None, None, :])
 
     @classmethod
+    @lru_cache(maxsize=KEPT)
     def of_extent(
         cls,
         size: tuple[int, int, int],

@@ -48,6 +48,9 @@ TINY = 1e-9
 LOGIT_END = 16.0
 """Largest |logit|: float32 cannot distinguish a sigmoid beyond it from its bound."""
 
+Shapes = dict[str, dict[str, Tensor]]
+"""The shape parameters of each GENEO by symbol, by the name of the GENEO."""
+
 
 class MetricSceneNet(GeneoModel):
     """A SCENE-Net whose kernels have lengths in metres.
@@ -173,22 +176,19 @@ class MetricSceneNet(GeneoModel):
 
     def body_radius(self) -> float:
         """m, radius of the body that kernels and cross-sections follow; 0 where they do not."""
-        radii = [
-            float(self.shape_of(name)[parameter.name].detach())
+        return self._body_radius(self._shapes())
+
+    def _body_radius(self, shapes: Shapes) -> float:
+        return max(self._measured_as("half_width", shapes).values(), default=0.0)
+
+    def _measured_as(self, field: str, shapes: Shapes) -> dict[str, float]:
+        """The number of each GENEO that is measured as ``field``, m, by name."""
+        return {
+            name: float(shapes[name][parameter.name].detach())
             for name in (self.names if self.measured else ())
             for parameter in self.parameters_of(name)
-            if parameter.measured == "half_width"
-        ]
-        return max(radii, default=0.0)
-
-    def support_of(self, name: str) -> float:
-        """m, horizontal reach of the GENEO called ``name``."""
-        support = self.metric.radius + self.body_radius()
-        for parameter in self.parameters_of(name) if self.measured else ():
-            if parameter.measured == "reach":
-                reach = float(self.shape_of(name)[parameter.name].detach())
-                support = max(support, reach + BEYOND_REACH_M)
-        return min(support, LARGEST_LENGTH)
+            if parameter.measured == field
+        }
 
     @property
     def section_radius(self) -> float:
@@ -197,14 +197,21 @@ class MetricSceneNet(GeneoModel):
         corners = math.sqrt(2) * body + CORNER_M if body else 0.0
         return max(self.metric.section_radius, corners)
 
-    def extent_of(self, name: str) -> Extent:
-        """m, how far the GENEO called ``name`` reaches."""
-        numbers = {symbol: float(v.detach()) for symbol, v in self.shape_of(name).items()}
-        own = self.kernel_of(name).extent(numbers)
-        return own or Extent(self.metric.above, self.metric.below, self.support_of(name))
+    def _extents(self, shapes: Shapes) -> dict[str, Extent]:
+        """m, how far each GENEO reaches, by name."""
+        support = self.metric.radius + self._body_radius(shapes)
+        heads = self._measured_as("reach", shapes)
+        found = {}
+        for name, shape in shapes.items():
+            around = max(support, heads[name] + BEYOND_REACH_M) if name in heads else support
+            numbers = {symbol: float(value.detach()) for symbol, value in shape.items()}
+            own = self.kernel_of(name).extent(numbers)
+            general = Extent(self.metric.above, self.metric.below, min(around, LARGEST_LENGTH))
+            found[name] = own or general
+        return found
 
     def _discretise(self, voxel_size: float) -> None:
-        extents = [self.extent_of(name) for name in self.names]
+        extents = self._extents(self._shapes()).values()
         high = whole_voxels(max(max(e.up, e.down) for e in extents), voxel_size)
         wide = 2 * whole_voxels(max(e.around for e in extents), voxel_size) + 1
         # Centred on the voxel it responds at, so twice the longer side high; ``_orbit`` sets the
@@ -308,26 +315,40 @@ class MetricSceneNet(GeneoModel):
             for symbol, (low, high) in ranges.items()
         }
 
+    def _shapes(self) -> Shapes:
+        return {name: self.shape_of(name) for name in self.names}
+
     def mixing_weights(self) -> Tensor:
         """lambda, (K,), positive, sums to 1: a softmax whose last logit is 0."""
         free = [self.mixing[name] for name in self.names[:-1]]
         return torch.softmax(torch.stack([*free, torch.zeros(())]), dim=0)
 
     def kernels(self) -> Tensor:
-        return torch.stack([self._sampled(name, (0.0, 0.0))[0] for name in self.names])
+        return torch.stack([sampled[0] for sampled in self._sampled((0.0, 0.0))])
 
     def orbits(self) -> list[Tensor]:
-        return [self._sampled(name) for name in self.names]
+        return self._sampled()
 
-    def _sampled(self, name: str, direction: tuple[float, float] | None = None) -> Tensor:
-        """The kernel of the GENEO called ``name`` in one direction (azimuth, slope) or in all of
-        its orbit, (n, kz, ky, kx)."""
+    def _sampled(self, direction: tuple[float, float] | None = None) -> list[Tensor]:
+        """The kernel of each GENEO in one direction (azimuth, slope) or in all of its orbit,
+        (n, kz, ky, kx)."""
+        shapes = self._shapes()
+        extents = self._extents(shapes)
+        return [self._sample(name, shapes[name], extents[name], direction) for name in self.names]
+
+    def _sample(
+        self,
+        name: str,
+        shape: dict[str, Tensor],
+        extent: Extent,
+        direction: tuple[float, float] | None,
+    ) -> Tensor:
         seen = self.voxel_size if self.measured else 0.0
-        up, down, around = self.extent_of(name)
+        up, down, around = extent
         lattice = Lattice.of_extent(self.kernel_size, around, self.voxel_size, voxel=seen)
         ends = (lattice.z >= -down * (1 + 1e-6)) & (lattice.z <= up * (1 + 1e-6))
         assert lattice.inside is not None
-        kernel, shape = self.kernel_of(name), self.shape_of(name)
+        kernel = self.kernel_of(name)
         if direction is None:
             sampled = kernel.orbit(lattice, shape)
         else:

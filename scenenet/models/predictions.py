@@ -115,17 +115,19 @@ class Answers:
     def __init__(self, model: MetricSceneNet) -> None:
         self._model = model
         self._responders: dict[float, Callable[[Occupancy], torch.Tensor]] = {}
+        self._kernels: dict[float, torch.Tensor] = {}
 
     def __call__(self, crop: PreparedCrop) -> np.ndarray:
         """Probability of each occupied voxel, (M,) float32; empty voxels have probability 0."""
-        model, section = self._model.at(crop.voxel_size), crop.section
+        size, section = crop.voxel_size, crop.section
         if section is None:
-            if crop.voxel_size not in self._responders:
-                self._responders[crop.voxel_size] = model.responder()
-            highest = self._responders[crop.voxel_size](crop.observed).sum(dim=0).numpy()
+            if size not in self._responders:
+                self._responders[size] = self._model.at(size).responder()
+            highest = self._responders[size](crop.observed).sum(dim=0).numpy()
         else:
-            kernel = model.observer()[0].detach()[None]
-            observed = convolve_at_voxels(crop.observed, kernel, section.at)[0].numpy()
+            if size not in self._kernels:
+                self._kernels[size] = self._model.at(size).observer()[0].detach()[None]
+            observed = convolve_at_voxels(crop.observed, self._kernels[size], section.at)[0].numpy()
             highest = observed[strongest(observed, section.starts, section.rows)]
         return np.tanh(np.maximum(highest, 0))[crop.row]
 

@@ -28,9 +28,11 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A survey that the workflow did not generate."""
     from scenenet.synthetic import SyntheticSettings, make_survey
 
-    path = tmp_path_factory.mktemp("recorded") / "own.laz"
-    make_survey(SyntheticSettings(towers=2, seed=9, density=4), path)
-    return path
+    settings = SyntheticSettings(towers=2, seed=9, density=4)
+    folder = made_once(
+        tmp_path_factory, "recorded", lambda made: make_survey(settings, made / "own.laz")
+    )
+    return folder / "own.laz"
 
 
 @pytest.fixture(scope="session")

@@ -113,6 +113,8 @@ System = Annotated[
         "or a file with WKT (.prj). A file that states another one is an error.",
     ),
 ]
+RESOLUTION = 64
+"""Voxels along each edge of a crop where none are given (thesis 5.2.1)."""
 Resolution = Annotated[
     int,
     typer.Option(

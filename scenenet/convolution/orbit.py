@@ -152,11 +152,10 @@ def _strongest(
             for qz in range(max(0, az - z), min(kz, depth + az - z)):
                 for qy in range(max(0, ay - y), min(ky, height + ay - y)):
                     source = (plane + qz - az) * height + y + qy - ay
-                    begin = source * width
-                    for j in range(rows[source], rows[source + 1]):
-                        qx = flat[j] - begin - x + ax
-                        if qx < 0:
-                            continue
+                    before = source * width + x - ax
+                    end = rows[source + 1]
+                    for j in range(_first(flat, rows[source], end, before), end):
+                        qx = flat[j] - before
                         if qx >= kx:
                             break
                         q = (qz * ky + qy) * kx + qx
@@ -164,3 +163,15 @@ def _strongest(
                         for e in range(starts[q], starts[q + 1]):
                             sums[which[e]] += factor * value[e]
             out[i] = sums.max()
+
+
+@numba.njit(**COMPILED)
+def _first(flat, low, high, value):  # pragma: no cover - compiled
+    """The first of the ascending ``flat[low:high]`` that is at least ``value``; ``high`` if none."""
+    while low < high:
+        middle = (low + high) // 2
+        if flat[middle] < value:
+            low = middle + 1
+        else:
+            high = middle
+    return low

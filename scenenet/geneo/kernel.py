@@ -173,8 +173,9 @@ class GeneoKernel(ABC):
         """Whether it has a direction."""
         return self.turns > 1 or self.slopes != (0.0,)
 
-    def orbit(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
-        """The kernel in all its directions, (turns * slopes, kz, ky, kx).
+    def orbit(self, lattice: Lattice, shape: Mapping[str, Tensor], azimuth: float = 0.0) -> Tensor:
+        """The kernel in all its directions, (turns * slopes, kz, ky, kx), of which the first is
+        ``azimuth``, radians from x towards y.
 
         On a lattice that a quarter turn leaves unchanged, the other quarters are turned copies, so
         that the operator is equivariant under quarter turns to the last digit.
@@ -182,7 +183,7 @@ class GeneoKernel(ABC):
         _, ky, kx = lattice.size
         quarters = 4 if self.turns % 4 == 0 and ky == kx and ky % 2 == 1 else 1
         first = [
-            self.sample(lattice.turned(2 * math.pi * turn / self.turns, slope), shape)
+            self.sample(lattice.turned(azimuth + 2 * math.pi * turn / self.turns, slope), shape)
             for turn in range(self.turns // quarters)
             for slope in self.slopes
         ]

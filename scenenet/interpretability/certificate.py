@@ -9,10 +9,12 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from scenenet.core.errors import InputError
-from scenenet.interpretability.geneo_properties import certify
+from scenenet.interpretability.composed_properties import certify_composed
+from scenenet.interpretability.equivariance import Scene, sample_scene
+from scenenet.interpretability.geneo_properties import ANGLES_DEG, certify
 from scenenet.interpretability.result import ModelCertificate, Statement
-from scenenet.models.model_file import read_model
+from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.model_file import ModelCard, read_model
 
 SCENE = "a generated pole of 15 m with an arm, two conductors, two trees and uneven ground"
 """The scene on which every model is measured, so that certificates are comparable."""
@@ -29,17 +31,12 @@ def certificate(model: str | Path) -> ModelCertificate:
     A model without GENEOs has the statements of ``OF_CONVOLUTION`` only.
 
     Raises:
-        InputError: the file is not a model, or its observer is not one kernel.
+        InputError: the file is not a model.
     """
     trained, card = read_model(model)
-    if not trained.linear:
-        raise InputError(
-            "there is no certificate for this model: its response is not that of one kernel, but a "
-            "maximum over directions, or measured in the answer of another observer",
-            file=model,
-            remedy="Measure the equivariance of each of its kernels with scenenet geneo try",
-        )
     size = trained.observed_size(card.voxel_size)
+    if isinstance(trained, GeneoModel) and not trained.linear:
+        return _composed(trained, card, size)
     found = certify(trained, voxel_size=size, measurement=card.measurement, tau=card.tau)
     worst = max((t.mean_h for t in found.turns if t.degrees and t.degrees % 90), default=None)
     values = (
@@ -70,6 +67,26 @@ def certificate(model: str | Path) -> ModelCertificate:
         half_voxel=found.half_voxel,
         turns=found.turns,
         statements=statements,
+        numbers=numbers,
+    )
+
+
+def _composed(model: GeneoModel, card: ModelCard, size: float) -> ModelCertificate:
+    """The certificate of a model that is not one kernel."""
+    scene = Scene.of(sample_scene(), size, card.measurement)
+    found = certify_composed(model.at(size), scene, ANGLES_DEG, card.tau, seed=0)
+    numbers = asdict(found)
+    for name in ("kind", "half_voxel", "turns"):
+        del numbers[name]
+    return ModelCertificate(
+        model=card.name,
+        seed=card.provenance.get("seed"),
+        kind=found.kind,
+        voxel_size=size,
+        scene=SCENE,
+        half_voxel=found.half_voxel,
+        turns=found.turns,
+        statements=tuple(found.statements()),
         numbers=numbers,
     )
 

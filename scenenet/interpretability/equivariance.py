@@ -4,7 +4,7 @@ Eq. 3.1)."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -118,14 +118,12 @@ def turns_of(
 ) -> tuple[Turn, tuple[Turn, ...]]:
     """Differences after a shift by half a voxel along x and y, and after a rotation by each of
     ``angles`` (degrees)."""
-    kernel, bias = model.observer()
+    observe = observed_by(model)
 
     def outputs(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """H and M at the points, each (N,)."""
         occupancy, at = scene.voxelised(xyz)
-        observed = convolve(occupancy, kernel)
-        if bias is not None:
-            observed = observed + bias
+        observed = observe(occupancy)
         probability = model(occupancy)
         return (
             observed.reshape(-1).numpy()[at].astype(float),
@@ -154,6 +152,42 @@ def turns_of(
     return shifted, tuple(compare(scene.turned(angle), float(angle)) for angle in angles)
 
 
+def observed_by(model: VoxelModel) -> Callable[[Occupancy], Tensor]:
+    """A function from grids to H, (B, D, H, W). A model that is not linear answers at occupied
+    voxels; H is 0 elsewhere."""
+    if model.linear:
+        kernel, bias = model.observer()
+        return lambda occupancy: convolve(occupancy, kernel) + (0 if bias is None else bias)
+    respond = model.responder()
+
+    def observed(occupancy: Occupancy) -> Tensor:
+        parts = respond(occupancy).sum(dim=0)
+        volume = torch.zeros(occupancy.n_voxels, dtype=parts.dtype)
+        volume[torch.from_numpy(occupancy.flat())] = parts
+        return volume.reshape(len(occupancy), *occupancy.shape)
+
+    return observed
+
+
+def measured_errors(model: VoxelModel, scene: Scene) -> tuple[float, float]:
+    """Errors of H under ``SHIFT`` and under the worst quarter turn, as shares of max |H|, from the
+    model itself."""
+    observe = observed_by(model)
+    dense = scene.voxelised(scene.xyz)[0].dense()[0]
+
+    def h(volume: Tensor) -> Tensor:
+        return observe(_occupancy(volume))[0]
+
+    (dz, dy, dx), (nz, ny, nx) = SHIFT, scene.grid.shape
+    padded = torch.nn.functional.pad(dense, (0, dx, 0, dy, 0, dz))
+    before, after = h(padded), h(torch.roll(padded, SHIFT, (0, 1, 2)))
+    largest = float(before.abs().max()) or 1.0
+    shifted = float((after[dz:, dy:, dx:] - before[:nz, :ny, :nx]).abs().max())
+    still = h(dense)
+    quarters = [h(torch.rot90(dense, q, (1, 2))) - torch.rot90(still, q, (1, 2)) for q in (1, 2, 3)]
+    return shifted / largest, max(float(q.abs().max()) for q in quarters) / largest
+
+
 def kernel_turn_error(kernel: Tensor) -> float:
     """max |k - k after a quarter turn| / max |k|; 1 if the box has no such symmetry."""
     _, ky, kx = kernel.shape
@@ -165,8 +199,12 @@ def kernel_turn_error(kernel: Tensor) -> float:
 
 def response(kernel: Tensor, dense: Tensor) -> Tensor:
     """The response (D, H, W) of ``kernel`` to a scene given as a volume (D, H, W)."""
+    return convolve(_occupancy(dense), kernel)[0]
+
+
+def _occupancy(dense: Tensor) -> Occupancy:
+    """A volume (D, H, W) as a grid."""
     depth, height, width = dense.shape
     flat = dense.reshape(-1).numpy()
     occupied = np.flatnonzero(flat)
-    occupancy = Occupancy.of_grids([occupied], [flat[occupied]], (depth, height, width))
-    return convolve(occupancy, kernel)[0]
+    return Occupancy.of_grids([occupied], [flat[occupied]], (depth, height, width))

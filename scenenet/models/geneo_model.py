@@ -132,9 +132,14 @@ class GeneoModel(VoxelModel):
         ]
         return torch.stack([w * h for w, h in zip(self.mixing_weights(), answers, strict=True)])
 
+    @abstractmethod
+    def orbit_of(self, name: str, azimuth: float = 0.0) -> Tensor:
+        """The kernels of the GENEO called ``name`` in all its directions, (n, kz, ky, kx), before
+        mixing, all turned by ``azimuth`` radians."""
+
     def orbits(self) -> list[Tensor]:
-        """The kernels of each GENEO in all its directions, (n, kz, ky, kx) each, before mixing."""
-        return [kernel[None] for kernel in self.kernels()]
+        """The kernels of each GENEO in all its directions."""
+        return [self.orbit_of(name) for name in self.names]
 
     def responder(self) -> Callable[[Occupancy], Tensor]:
         if self.linear:

@@ -324,35 +324,44 @@ class MetricSceneNet(GeneoModel):
         return torch.softmax(torch.stack([*free, torch.zeros(())]), dim=0)
 
     def kernels(self) -> Tensor:
-        return torch.stack([sampled[0] for sampled in self._sampled((0.0, 0.0))])
-
-    def orbits(self) -> list[Tensor]:
-        return self._sampled()
-
-    def _sampled(self, direction: tuple[float, float] | None = None) -> list[Tensor]:
-        """The kernel of each GENEO in one direction (azimuth, slope) or in all of its orbit,
-        (n, kz, ky, kx)."""
         shapes = self._shapes()
         extents = self._extents(shapes)
-        return [self._sample(name, shapes[name], extents[name], direction) for name in self.names]
+        return torch.stack(
+            [
+                self._sample(name, shapes[name], extents[name], along_x=True)[0]
+                for name in self.names
+            ]
+        )
+
+    def orbits(self) -> list[Tensor]:
+        shapes = self._shapes()
+        extents = self._extents(shapes)
+        return [self._sample(name, shapes[name], extents[name]) for name in self.names]
+
+    def orbit_of(self, name: str, azimuth: float = 0.0) -> Tensor:
+        shapes = self._shapes()
+        return self._sample(name, shapes[name], self._extents(shapes)[name], azimuth)
 
     def _sample(
         self,
         name: str,
         shape: dict[str, Tensor],
         extent: Extent,
-        direction: tuple[float, float] | None,
+        azimuth: float = 0.0,
+        *,
+        along_x: bool = False,
     ) -> Tensor:
+        """The kernels of the orbit of a GENEO, or only the one along x, (n, kz, ky, kx)."""
         seen = self.voxel_size if self.measured else 0.0
         up, down, around = extent
         lattice = Lattice.of_extent(self.kernel_size, around, self.voxel_size, voxel=seen)
         ends = (lattice.z >= -down * (1 + 1e-6)) & (lattice.z <= up * (1 + 1e-6))
         assert lattice.inside is not None
         kernel = self.kernel_of(name)
-        if direction is None:
-            sampled = kernel.orbit(lattice, shape)
+        if along_x:
+            sampled = kernel.sample(lattice, shape)[None]
         else:
-            sampled = kernel.sample(lattice.turned(*direction), shape)[None]
+            sampled = kernel.orbit(lattice, shape, azimuth)
         scale = self.voxel_size / COLUMN_M if kernel.adds_up_height else 1.0
         return sampled * lattice.inside * ends * scale
 

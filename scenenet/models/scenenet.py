@@ -59,9 +59,9 @@ class SceneNet(GeneoModel):
             [self.kernel_of(name).sample(lattice, self.shape_of(name)) for name in self.names]
         )
 
-    def orbits(self) -> list[Tensor]:
+    def orbit_of(self, name: str, azimuth: float = 0.0) -> Tensor:
         lattice = Lattice.of_size(self.kernel_size)
-        return [self.kernel_of(name).orbit(lattice, self.shape_of(name)) for name in self.names]
+        return self.kernel_of(name).orbit(lattice, self.shape_of(name), azimuth)
 
     def unit_of(self, parameter: ShapeParameter) -> str:
         return parameter.unit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from scenenet.models.settings import (
@@ -23,8 +23,26 @@ discriminant; larger steps lead away from it."""
 VALIDATION_SHARE = 0.3
 """Share of the crops that is kept to choose tau and the kernel size on."""
 
+THEMSELVES = {"whole_towers": False, "section_radius": 0.0, "section_above": 0.0}
+"""Settings of an observer whose voxels answer for themselves, not for the body of a tower."""
+
 TUNING = TuningSettings(kernel_sizes=((9, 7, 7), (9, 5, 5), (13, 7, 7)))
 """Kernel sizes that the crops of the thesis favour, besides that of the training."""
+
+
+OBSERVERS: Mapping[str, Mapping[str, Any]] = {
+    "wire": {
+        "geneos": ("line",),
+        "first": ("identity", "canopy", "ground"),
+        "metric": {"numbers": "searched", "observed": 0.5, **THEMSELVES},
+        "search": {"searches": 2, "trial": 8, "starts": 24, "population": 10, "generations": 30},
+    },
+}
+"""Settings of the observers of targets other than towers (docs/method/observers.md), by the name of
+the target; others take the kernels of the thesis."""
+
+VOXEL_SIZES: Mapping[str, float] = {"wire": 0.5}
+"""m, voxel size of the training of these observers, where none is given."""
 
 
 def is_searched(kind: str, protocol: str) -> bool:
@@ -44,7 +62,7 @@ def preset(
 
     Args:
         epochs, learning_rate: of training by gradient; None for ``EPOCHS`` and ``LEARNING_RATES``.
-        geneos: kernels of a SCENE-Net; None for those of the thesis.
+        geneos: kernels of a SCENE-Net; None for those of ``OBSERVERS``, or of the thesis.
         target: what the model finds; only a model of towers gives whole towers.
 
     Raises:
@@ -54,7 +72,10 @@ def preset(
     chosen: dict[str, Any] = {} if geneos is None else {"geneos": tuple(geneos)}
     chosen["target"] = target.text
     if is_searched(kind, protocol) and not target.is_tower:
-        chosen["metric"] = MetricSettings(whole_towers=False)
+        if geneos is None and target.name in OBSERVERS:
+            chosen |= OBSERVERS[target.name]
+        else:
+            chosen["metric"] = MetricSettings(whole_towers=False)
     if is_searched(kind, protocol):
         if epochs is not None or learning_rate is not None:
             raise ValueError("a search has no epochs and no learning rate")
@@ -67,6 +88,11 @@ def preset(
     if kind == "cnn":  # the protocol of a CNN is its training
         return ModelSettings(name=kind, kind=kind, training=training, **chosen)
     return ModelSettings(name=kind, kind=kind, protocol=protocol, training=training, **chosen)
+
+
+def voxel_size(kind: str, protocol: str, target: Target) -> float | None:
+    """m, voxel size of the training where none is given; None for that of a 64^3 grid."""
+    return VOXEL_SIZES.get(target.name) if is_searched(kind, protocol) else None
 
 
 def validation_share(kind: str, protocol: str) -> float:

@@ -10,6 +10,7 @@ import typer
 
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
+    RESOLUTION,
     AsJson,
     Fits,
     Kernels,
@@ -44,7 +45,7 @@ def command(
             "voxel size of the model; towers are searched for in whole surveys."
         ),
     ] = GRID_OF_THE_THESIS,
-    resolution: Resolution = 64,
+    resolution: Resolution = RESOLUTION,
     truth: Annotated[
         list[Path] | None,
         typer.Option(

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
+    RESOLUTION,
     AsJson,
     Kernels,
     Kinds,
@@ -17,7 +18,6 @@ from scenenet.cli.options import (
     Labelled,
     Overwrite,
     Protocols,
-    Resolution,
     cube,
     metric,
     target_of,
@@ -85,12 +85,21 @@ TargetOption = Annotated[
         "14,16, with a name: lamp=14,16.",
     ),
 ]
+Resolution = Annotated[
+    int | None,
+    typer.Option(
+        help=f"Voxels along each edge of a crop; {RESOLUTION} if neither this nor --voxel-size is "
+        "given.",
+    ),
+]
 VoxelSize = Annotated[
     float | None,
     typer.Option(
         min=SMALLEST_VOXEL,
         max=LARGEST_VOXEL,
-        help="Edge of a voxel in m, the same in every crop, instead of --resolution.",
+        help="Edge of a voxel in m, the same in every crop, instead of --resolution; "
+        + "; ".join(f"{size:g} for --target {name}" for name, size in presets.VOXEL_SIZES.items())
+        + ".",
     ),
 ]
 Square = Annotated[
@@ -128,7 +137,7 @@ def command(
     learning_rate: LearningRate = None,
     geneos: Geneos = None,
     kernels: Kernels = None,
-    resolution: Resolution = 64,
+    resolution: Resolution = None,
     target: TargetOption = TOWER.text,
     voxel_size: VoxelSize = None,
     square: Square = DEFAULT_SQUARE,
@@ -167,6 +176,10 @@ def command(
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.model_file import is_model_file
 
+    if voxel_size is None and resolution is None:
+        voxel_size = presets.voxel_size(kind.value, protocol.value, finds)
+    edges = RESOLUTION if resolution is None else resolution
+    grid = cube(edges) if voxel_size is None else metric(voxel_size)
     if validation is None:
         validation = presets.validation_share(kind.value, protocol.value)
     check_outputs([Output(out, is_model_file)], labelled, overwrite=overwrite)
@@ -174,7 +187,7 @@ def command(
     result = train_files(
         labelled,
         codes.value,
-        cube(resolution) if voxel_size is None else metric(voxel_size),
+        grid,
         settings,
         presets.TUNING,
         range(seeds),

@@ -167,7 +167,7 @@ def _strongest(
 
 @numba.njit(**COMPILED)
 def _first(flat, low, high, value):  # pragma: no cover - compiled
-    """The first of the ascending ``flat[low:high]`` that is at least ``value``; ``high`` if none."""
+    """The first of the ascending ``flat[low:high]`` that is no less than ``value``, or ``high``."""
     while low < high:
         middle = (low + high) // 2
         if flat[middle] < value:

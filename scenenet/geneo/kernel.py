@@ -242,6 +242,13 @@ def per_support(kernel: Tensor, lattice: Lattice) -> Tensor:
     return kernel / lattice.inside.sum()
 
 
+def full_ball(lattice: Lattice, radius: Tensor) -> Tensor:
+    """A ball (kz, ky, kx) of ``radius``, whose response to a full flat surface through its centre
+    is 1. It falls off within a voxel, so that its size has a gradient."""
+    ball = ((radius - lattice.squared.sqrt()) / lattice.step + 0.5).clamp(0, 1)
+    return ball * (lattice.step**2 / (math.pi * radius.square()))
+
+
 def normalised(kernel: Tensor) -> Tensor:
     """A kernel (kz, ky, kx) that is not negative, with each slice divided by its sum; empty slices
     stay empty."""

@@ -103,7 +103,7 @@ class MetricSceneNet(GeneoModel):
         self.metric = metric or MetricSettings()
         self.first = first
         self.evidence: dict[str, Evidence] = {}
-        for label, value in self.fixed_numbers().items():
+        for label, value in self._own_fixed().items():
             name, symbol = label.rsplit(".", 1)
             parameter = next(p for p in self.parameters_of(name) if p.name == symbol)
             self._store(name, parameter, value)
@@ -167,6 +167,10 @@ class MetricSceneNet(GeneoModel):
 
     def fixed_numbers(self) -> dict[str, float]:
         """The numbers that are neither measured nor searched, with their values."""
+        before = {} if self.first is None else self.first.fixed_numbers()
+        return self._own_fixed() | {f"first.{name}": value for name, value in before.items()}
+
+    def _own_fixed(self) -> dict[str, float]:
         found = {}
         for name in self.names if self.measured else ():
             for parameter in self.parameters_of(name):

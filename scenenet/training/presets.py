@@ -34,8 +34,8 @@ OBSERVERS: Mapping[str, Mapping[str, Any]] = {
     "wire": {
         "geneos": ("line",),
         "first": ("identity", "canopy", "ground"),
-        "metric": {"numbers": "searched", "observed": 0.5, **THEMSELVES},
-        "search": {"searches": 2, "trial": 8, "starts": 24, "population": 10, "generations": 30},
+        "metric": {"observed": 0.5, **THEMSELVES},
+        "search": {"searches": 1, "trial": 0, "starts": 32, "population": 8, "generations": 12},
     },
 }
 """Settings of the observers of targets other than towers (docs/method/observers.md), by the name of

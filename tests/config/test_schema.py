@@ -240,7 +240,8 @@ def test_an_unknown_kernel_is_refused_with_the_nearest_name():
     model = {"name": "m", "kind": "scenenet", "geneos": ["arrow", "cylindre"]}
     message = complaint(models=[model])
     assert (
-        "models[0].geneos[1]: 'cylindre' is none of the kernels arrow, canopy, cylinder" in message
+        "models[0].geneos[1]: 'cylindre' is none of the kernels arrow, blob, canopy, cylinder"
+        in message
     )
     assert "did you mean 'cylinder'?" in message
 

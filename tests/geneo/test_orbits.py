@@ -102,10 +102,24 @@ def test_the_response_to_volumes_grows_with_the_ball_and_to_a_surface_does_not()
     assert found[1][1] / found[0][1] == pytest.approx(2, rel=0.1)
 
 
-@pytest.mark.parametrize("name", ["line", "ground", "canopy"])
+@pytest.mark.parametrize("name", ["line", "ground", "canopy", "plane"])
 def test_every_number_of_the_kernel_has_a_gradient(name):
     kernel = kernel_named(name)
     shape = {p.name: sum(p.metric_range) / 2 for p in kernel.parameters}
     tensors = {k: torch.tensor(v, dtype=EXACT, requires_grad=True) for k, v in shape.items()}
     kernel.orbit(lattice(name, shape), tensors).square().sum().backward()
     assert all(float(t.grad.abs()) > 0 for t in tensors.values())
+
+
+def test_a_surface_opposes_a_volume_and_a_volume_does_not():
+    kernel, shape = kernel_named("plane"), {"r": 2.0, "h": 1.0}
+    box = lattice("plane", shape)
+    values = kernel.sample(box, numbers(shape))
+    assert float(values.sum()) == pytest.approx(0, abs=1e-9)
+    assert float(values[box.size[0] // 2].sum()) == pytest.approx(-1, abs=0.1)
+
+
+def test_a_blob_is_the_opposite_of_a_canopy():
+    box = lattice("blob", {"r": 2.0})
+    blob = kernel_named("blob").sample(box, numbers({"r": 2.0}))
+    assert torch.equal(blob, -kernel_named("canopy").sample(box, numbers({"r": 2.0})))

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 from torch import Tensor
 
-from scenenet.geneo.kernel import Extent, GeneoKernel, ShapeParameter
+from scenenet.geneo.kernel import Extent, GeneoKernel, ShapeParameter, full_ball
 from scenenet.geneo.lattice import Lattice
 from scenenet.geneo.registry import register
 from scenenet.geneo.sentences import Numbers, Reference, m
@@ -36,14 +35,13 @@ class Canopy(GeneoKernel):
             "radius of the ball in which points oppose a thin object",
             metric=(1.0, 4.0),
             sentence=_ball,
+            # The air that conductors of high voltage have around them.
+            fixed=3.0,
         ),
     )
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
-        radius = shape["r"]
-        # The ball falls off within a voxel, so that its size has a gradient.
-        ball = ((radius - lattice.squared.sqrt()) / lattice.step + 0.5).clamp(0, 1)
-        return -ball * (lattice.step**2 / (math.pi * radius.square()))
+        return -full_ball(lattice, shape["r"])
 
     def extent(self, shape: Mapping[str, float]) -> Extent:
         return Extent(shape["r"], shape["r"], shape["r"])

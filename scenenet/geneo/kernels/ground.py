@@ -47,6 +47,8 @@ class Ground(GeneoKernel):
             "distance up to which a surface must extend in every direction",
             metric=(2.0, 8.0),
             sentence=_reach,
+            # Less than the distance between the circuits of a line, which lie in one plane too.
+            fixed=4.0,
         ),
         ShapeParameter(
             "h",
@@ -56,6 +58,8 @@ class Ground(GeneoKernel):
             "rise of the surface within that distance",
             metric=(0.5, 2.0),
             sentence=_rise,
+            # A slope of 25 %.
+            fixed=1.0,
         ),
     )
 

@@ -46,6 +46,8 @@ class Line(GeneoKernel):
             "length of a conductor that a voxel must be the end of",
             metric=(4.0, 12.0),
             sentence=_length,
+            # Longer than a crossarm, and shorter than what a crop holds of a span.
+            fixed=10.0,
         ),
         ShapeParameter(
             "r",
@@ -55,6 +57,8 @@ class Line(GeneoKernel):
             "deviation of a conductor from a straight line",
             metric=(0.05, 0.8),
             sentence=_thickness,
+            # A bundle of conductors, and the sag over 10 m.
+            fixed=0.45,
         ),
     )
 

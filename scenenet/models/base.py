@@ -13,6 +13,7 @@ from scenenet.convolution.observer import observe
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
 from scenenet.metrics.threshold_curve import ThresholdCurve
+from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.settings import KernelSize
 
 
@@ -86,9 +87,13 @@ class VoxelModel(nn.Module):
         """Whether its response before tanh is that of one kernel, which ``observer`` gives."""
         return True
 
-    def responder(self) -> Callable[[Occupancy], Tensor]:
+    def responder(self, known: KnownAnswers | None = None) -> Callable[[Occupancy], Tensor]:
         """A function from grids to the parts (K, M) of H at their occupied voxels, whose sum over K
-        is H; no gradient. The kernels are sampled once, for all grids."""
+        is H; no gradient. The kernels are sampled once, for all grids.
+
+        Args:
+            known: what earlier responders of this model computed; for grids that stay in memory.
+        """
         kernel, bias = self.observer()
 
         def parts(occupancy: Occupancy) -> Tensor:

@@ -16,6 +16,7 @@ from scenenet.convolution.orbit import Orbit, strongest, strongest_at_voxels
 from scenenet.core.errors import InputError
 from scenenet.geneo import GeneoKernel, ShapeParameter, kernel_named
 from scenenet.models.base import VoxelModel
+from scenenet.models.known_answers import KnownAnswers
 
 
 class GeneoModel(VoxelModel):
@@ -141,21 +142,19 @@ class GeneoModel(VoxelModel):
         """The kernels of each GENEO in all its directions."""
         return [self.orbit_of(name) for name in self.names]
 
-    def responder(self) -> Callable[[Occupancy], Tensor]:
+    def responder(self, known: KnownAnswers | None = None) -> Callable[[Occupancy], Tensor]:
         if self.linear:
             kernels = self.weighted_kernels().detach()
             return lambda occupancy: self.responses(occupancy, kernels)
-        weights = self.mixing_weights().detach()
-        orbits = [Orbit.of(kernels) if len(kernels) > 1 else kernels for kernels in self.orbits()]
+        # Without a caller that knows its grids, each of them is seen once.
+        known = KnownAnswers().of_kernels() if known is None else known
+        weights, own = self.mixing_weights().detach(), tuple(self.names)
+        state = (self.voxel_size, *self.numbers()[: len(self.shape_list())])
+        orbits = known.kernels(own, state, lambda: [_stored(kernels) for kernels in self.orbits()])
 
         def parts(occupancy: Occupancy) -> Tensor:
-            answers = [
-                torch.from_numpy(strongest_at_voxels(occupancy, orbit))
-                if isinstance(orbit, Orbit)
-                else convolve_at_voxels(occupancy, orbit)[0]
-                for orbit in orbits
-            ]
-            return weights[:, None] * torch.stack(answers)
+            answers = known.answers(own, state, occupancy, lambda: _answers(orbits, occupancy))
+            return weights[:, None] * answers
 
         return parts
 
@@ -218,6 +217,23 @@ class GeneoModel(VoxelModel):
 
     def _stored_shape(self, name: str) -> nn.ParameterDict:
         return cast(nn.ParameterDict, self.shapes[name])
+
+
+def _stored(kernels: Tensor) -> Orbit | Tensor:
+    """An orbit of several kernels by position, a single one (1, kz, ky, kx) as it is."""
+    return Orbit.of(kernels) if len(kernels) > 1 else kernels.detach()
+
+
+def _answers(orbits: Sequence[Orbit | Tensor], occupancy: Occupancy) -> Tensor:
+    """The response of each GENEO at the occupied voxels, (K, M), before mixing."""
+    return torch.stack(
+        [
+            torch.from_numpy(strongest_at_voxels(occupancy, orbit))
+            if isinstance(orbit, Orbit)
+            else convolve_at_voxels(occupancy, orbit)[0]
+            for orbit in orbits
+        ]
+    )
 
 
 def _distinct(names: Sequence[str]) -> list[str]:

@@ -27,6 +27,7 @@ from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.settings import (
     LARGEST_KERNEL,
     LARGEST_LENGTH,
@@ -268,11 +269,15 @@ class MetricSceneNet(GeneoModel):
     def linear(self) -> bool:
         return super().linear and self.first is None
 
-    def responder(self) -> Callable[[Occupancy], Tensor]:
+    def responder(self, known: KnownAnswers | None = None) -> Callable[[Occupancy], Tensor]:
         if self.linear:
             return super().responder()
-        answer = super().responder()
-        measure = None if self.first is None else self.first.responder()
+        if self.first is None:
+            answer, measure = super().responder(known), None
+        else:
+            measure = self.first.responder(known)
+            # What this observer measures changes with the weights of the first one.
+            answer = super().responder(None if known is None else known.of_kernels())
 
         def parts(occupancy: Occupancy) -> Tensor:
             if measure is None:

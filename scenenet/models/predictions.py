@@ -17,6 +17,7 @@ from scenenet.dataset.batches import batch
 from scenenet.dataset.voxels import Measurement, VoxelSample
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.models.base import VoxelModel
+from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.metric_scenenet import MetricSceneNet
 
 EVALUATED_AT_ONCE = 8
@@ -112,8 +113,13 @@ class Answers:
     """The probabilities of a model with its present numbers, whose kernels are sampled once for
     each size of voxels."""
 
-    def __init__(self, model: MetricSceneNet) -> None:
-        self._model = model
+    def __init__(self, model: MetricSceneNet, known: KnownAnswers | None = None) -> None:
+        """Take a model as it is.
+
+        Args:
+            known: what was computed for the same crops with other mixing weights.
+        """
+        self._model, self._known = model, known
         self._responders: dict[float, Callable[[Occupancy], torch.Tensor]] = {}
         self._kernels: dict[float, torch.Tensor] = {}
 
@@ -122,7 +128,7 @@ class Answers:
         size, section = crop.voxel_size, crop.section
         if section is None:
             if size not in self._responders:
-                self._responders[size] = self._model.at(size).responder()
+                self._responders[size] = self._model.at(size).responder(self._known)
             highest = self._responders[size](crop.observed).sum(dim=0).numpy()
         else:
             if size not in self._kernels:
@@ -132,11 +138,17 @@ class Answers:
         return np.tanh(np.maximum(highest, 0))[crop.row]
 
 
-def curve_of(model: MetricSceneNet, crops: Sequence[PreparedCrop]) -> ThresholdCurve:
-    """Scores at every threshold over all voxels, empty ones included."""
+def curve_of(
+    model: MetricSceneNet, crops: Sequence[PreparedCrop], known: KnownAnswers | None = None
+) -> ThresholdCurve:
+    """Scores at every threshold over all voxels, empty ones included.
+
+    Args:
+        known: what was computed for the same crops with other mixing weights.
+    """
     total = ThresholdCurve.empty()
     with torch.no_grad():
-        probabilities_of = Answers(model)
+        probabilities_of = Answers(model, known)
         for crop in crops:
             curve = ThresholdCurve.of(probabilities_of(crop), crop.tower)
             curve.false[0] += crop.n_voxels - len(crop.tower)

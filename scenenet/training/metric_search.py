@@ -13,6 +13,7 @@ from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.metrics.score_columns import or_nan
 from scenenet.models.factory import new_model
+from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.predictions import PreparedCrop, curve_of, prepare_crops
 from scenenet.models.settings import ModelSettings, SearchSettings
@@ -71,7 +72,10 @@ def fit_by_search(
         history.append(row(state, time.perf_counter() - started) | {"search": chosen})
         _save(checkpoint, state, history)
     free.set(state.best)
-    model.evidence = evidence(model, measured, lambda: model.best_step(curve_of(model, learnt))[1])
+    known = KnownAnswers()
+    model.evidence = evidence(
+        model, measured, lambda: model.best_step(curve_of(model, learnt, known))[1]
+    )
     return model, pd.DataFrame(history)
 
 

@@ -10,6 +10,7 @@ import torch
 
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
+from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard, read_model, write_model
 from scenenet.models.scenenet import SceneNet
@@ -139,3 +140,19 @@ def test_a_model_in_voxels_learns_the_numbers_of_a_direction_by_gradient():
     gradients = {n: float(p.grad) for n, p in model.named_parameters() if p.grad is not None}
     assert gradients
     assert all(g != 0 for g in gradients.values())
+
+
+def test_answers_that_are_known_are_those_that_would_be_computed():
+    occupancy, _ = scene()
+    model, known = wire_model(), KnownAnswers()
+    changes = (
+        {},
+        {"first.lambda.identity": 0.55, "first.lambda.ground": 0.25},
+        {"first.canopy.r": 2.0},
+        {"line.l": 6.0},
+    )
+    for change in changes:
+        model.set_shape_parameters(NUMBERS | change)
+        with torch.no_grad():
+            found, expected = model.responder(known)(occupancy), model.responder()(occupancy)
+        assert torch.equal(found, expected), change

@@ -92,6 +92,16 @@ ModelFile = Annotated[
         default_factory=packaged_model,
     ),
 ]
+ModelFiles = Annotated[
+    list[Path],
+    typer.Option(
+        "--model",
+        help="Model file that scenenet train wrote (.json, .safetensors). Give one for each "
+        "target that you want to find.",
+        show_default="the model that comes with the package",
+        default_factory=lambda: [packaged_model()],
+    ),
+]
 LabelCodes = Annotated[
     Codes, typer.Option("--codes", help=f"Class scheme of the labels ({difference()}).")
 ]

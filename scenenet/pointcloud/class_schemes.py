@@ -69,12 +69,15 @@ class ClassCode(NamedTuple):
         role: what the class is to the method.
         look: what points of this class look like, where this does not follow from the role. For
             ``edp`` it is how the public TS40K crops use the code (docs: synthetic surveys).
+        main: whether points that are found to have the role get this code, where several classes
+            have it.
     """
 
     code: int
     name: str
     role: Role = "other"
     look: Look | None = None
+    main: bool = False
 
     @property
     def drawn_look(self) -> Look:
@@ -118,6 +121,11 @@ class ClassScheme:
     def with_role(self, role: Role) -> frozenset[int]:
         """Codes of all classes with ``role``."""
         return frozenset(entry.code for entry in self.codes if entry.role == role)
+
+    def main_code(self, role: Role) -> int:
+        """The code that points get that are found to have ``role``."""
+        entries = [entry for entry in self.codes if entry.role == role]
+        return max(entries, key=lambda entry: entry.main).code
 
     def class_name(self, code: int) -> str:
         """The name of a code; "undefined (77)" for one that the scheme does not list."""
@@ -169,7 +177,7 @@ EDP = ClassScheme(
         ClassCode(13, "Medium reliability"),
         ClassCode(14, "Low reliability"),
         ClassCode(15, "Power line support tower", "tower"),
-        ClassCode(16, "Main power line", "conductor"),
+        ClassCode(16, "Main power line", "conductor", main=True),
         ClassCode(17, "Other power line", "conductor"),
         ClassCode(18, "Fiber optic cable"),
         ClassCode(19, "Not rated object to be considered", "other", "ground"),
@@ -196,7 +204,7 @@ ASPRS = ClassScheme(
         ClassCode(11, "Road surface", "ground"),
         ClassCode(12, "Overlap points"),
         ClassCode(13, "Wire - guard (shield)", "conductor"),
-        ClassCode(14, "Wire - conductor (phase)", "conductor"),
+        ClassCode(14, "Wire - conductor (phase)", "conductor", main=True),
         ClassCode(15, "Transmission tower", "tower"),
         ClassCode(16, "Wire-structure connector (insulator)"),
         ClassCode(17, "Bridge deck"),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from scenenet.core.errors import InputError
 from scenenet.core.unchanged import FileState
+from scenenet.pointcloud.targets import TOWER
 
 
 class LeftOut(InputError):
@@ -30,6 +31,7 @@ class SurveyFile:
         towers: towers with a point in it, once the points were written. A tower at a seam counts in
             each of its files.
         tower_points: points with a tower id, once they were written.
+        target_points: points taken for each other target, by its name, once they were written.
         warnings: what looks wrong about it, as sentences.
         error: why it could not be used; None if it could.
     """
@@ -41,6 +43,7 @@ class SurveyFile:
     extent: tuple[float, float, float, float] | None = None
     towers: int = 0
     tower_points: int = 0
+    target_points: Mapping[str, int] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     error: InputError | None = None
 
@@ -51,14 +54,22 @@ class SurveyFile:
             return "left out"
         return "predicted" if self.error is None else "failed"
 
-    def to_json(self) -> dict[str, Any]:
-        """What all results say about it."""
+    def to_json(self, targets: Sequence[str] = (TOWER.name,)) -> dict[str, Any]:
+        """What all results say about it.
+
+        Args:
+            targets: names of what was looked for.
+        """
+        counts: dict[str, int] = {}
+        if TOWER.name in targets:
+            counts |= {"towers": self.towers, "tower_points": self.tower_points}
+        others = (name for name in targets if name != TOWER.name)
+        counts |= {f"{name}_points": self.target_points.get(name, 0) for name in others}
         return {
             "file": self.name,
             "status": self.status,
             "points": self.n_points,
-            "towers": self.towers,
-            "tower_points": self.tower_points,
+            **counts,
             "error": "" if self.error is None else str(self.error),
         }
 
@@ -73,6 +84,7 @@ class SurveyFile:
             "extent": self.extent,
             "towers": self.towers,
             "tower_points": self.tower_points,
+            "target_points": dict(self.target_points),
             "warnings": self.warnings,
             "error": None if error is None else error.to_json(),
             "left_out": isinstance(error, LeftOut),
@@ -92,6 +104,7 @@ class SurveyFile:
             extent=None if data["extent"] is None else tuple(data["extent"]),
             towers=data["towers"],
             tower_points=data["tower_points"],
+            target_points=data["target_points"],
             warnings=tuple(data["warnings"]),
             error=error,
         )
@@ -104,9 +117,11 @@ def readable(files: Iterable[SurveyFile]) -> Iterator[tuple[SurveyFile, FileStat
             yield file, file.state
 
 
-def write_status(path: str | Path, files: Sequence[SurveyFile]) -> None:
-    """Write a row per file of a survey as CSV."""
-    rows = [file.to_json() for file in files]
+def write_status(
+    path: str | Path, files: Sequence[SurveyFile], targets: Sequence[str] = (TOWER.name,)
+) -> None:
+    """Write a row per file of a survey as CSV; ``targets`` are the names of what was looked for."""
+    rows = [file.to_json(targets) for file in files]
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, list(rows[0]), lineterminator="\n")
         table.writeheader()

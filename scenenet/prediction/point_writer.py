@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,28 +10,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.pointcloud import add_dimensions
+from scenenet.pointcloud.targets import TOWER
 from scenenet.prediction.file_status import SurveyFile
+from scenenet.prediction.point_dimensions import (
+    TOWER_ID,
+    dimensions_of,
+    probability_of,
+    share_of,
+)
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.point_predictions import PointLookUp
 
 if TYPE_CHECKING:
     import pyproj
-
-PROBABILITY = "tower_probability"
-TOWER_ID = "tower_id"
-TOWER_CODE = 15
-"""Class code of a tower in the schemes asprs and edp."""
-SHARE_PREFIX = "share_"
-
-
-def point_dimensions(geneos: Iterable[str]) -> dict[str, tuple[type, str]]:
-    """The extra dimensions of a classified survey: name -> (numpy type, description)."""
-    dimensions: dict[str, tuple[type, str]] = {
-        PROBABILITY: (np.float32, "probability of a tower"),
-        TOWER_ID: (np.uint32, "id of tower, 0 none"),
-    }
-    shares = {f"{SHARE_PREFIX}{geneo}": (np.float32, "share of the response") for geneo in geneos}
-    return dimensions | shares
 
 
 def write_points(
@@ -41,7 +32,7 @@ def write_points(
     settings: PredictSettings,
     crs: pyproj.CRS | None,
 ) -> SurveyFile:
-    """Write every point of a file back, in order, with ``point_dimensions`` added.
+    """Write every point of a file back, in order, with the dimensions of each model added.
 
     Args:
         file: as it was read.
@@ -50,30 +41,46 @@ def write_points(
         crs: written if the file has no record of a system at all; None if it is not known.
 
     Returns:
-        the file, with the numbers of its towers and of the points that have a tower id.
+        the file, with the numbers of its towers and of the points taken for each target.
 
     Raises:
         InputError: the file changed after it was read; ``out`` stays as it was.
     """
-    chosen, in_tower = settings.classify_from, 0
+    models = look_up.models
+    counts = {model.target.name: 0 for model in models}
     towers: set[int] = set()
+    taken: dict[str, np.ndarray] = {}
 
     def values(xyz: np.ndarray) -> dict[str, np.ndarray]:
-        nonlocal in_tower
         points = look_up(xyz)
-        in_tower += int(np.count_nonzero(points.tower_id))
         towers.update(np.unique(points.tower_id[points.tower_id > 0]).tolist())
-        shares = zip(look_up.geneos, points.shares.T, strict=True)
-        named = {f"{SHARE_PREFIX}{geneo}": share for geneo, share in shares}
-        return {PROBABILITY: points.probability, TOWER_ID: points.tower_id} | named
+        named = {}
+        for number, (model, predicted) in enumerate(zip(models, points.models, strict=True)):
+            target = model.target
+            taken[target.name] = look_up.taken(points, number)
+            counts[target.name] += int(np.count_nonzero(taken[target.name]))
+            named[probability_of(target)] = predicted.probability
+            if target.is_tower:
+                named[TOWER_ID] = points.tower_id
+            for geneo, share in zip(model.tiles.geneos, predicted.shares.T, strict=True):
+                named[share_of(target, geneo)] = share
+        return named
 
-    def classify(dimensions: Mapping[str, np.ndarray], codes: np.ndarray) -> np.ndarray:
-        tower = dimensions[TOWER_ID] > 0
-        if chosen is not None:
-            tower &= np.isin(codes, chosen)
-        return np.where(tower, TOWER_CODE, codes).astype(codes.dtype)
+    def classify(_: Mapping[str, np.ndarray], codes: np.ndarray) -> np.ndarray:
+        written, free = codes, np.ones(len(codes), bool)
+        if settings.classify_from is not None:
+            free &= np.isin(codes, settings.classify_from)
+        for model in models:  # that of towers is the first, and its points are of nothing else
+            if model.code is not None:
+                own = taken[model.target.name]
+                written = np.where(free & own, model.code, written).astype(codes.dtype)
+                free &= ~own
+        return written
 
-    dimensions = point_dimensions(look_up.geneos)
+    dimensions: dict[str, tuple[type, str]] = {}
+    for model in models:
+        dimensions |= dimensions_of(model.target, model.tiles.geneos)
     reclassify = classify if settings.classify else None
     add_dimensions(file.path, out, dimensions, values, file.state, reclassify, crs)
-    return replace(file, towers=len(towers), tower_points=in_tower)
+    tower_points = counts.pop(TOWER.name, 0)
+    return replace(file, towers=len(towers), tower_points=tower_points, target_points=counts)

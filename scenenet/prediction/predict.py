@@ -24,21 +24,24 @@ from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.unchanged import FileState
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
+from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.prediction.file_status import SurveyFile, readable
 from scenenet.prediction.found_towers import FoundTowers, find_in_survey
+from scenenet.prediction.point_dimensions import TOWER_CODE
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
+from scenenet.prediction.used_models import ModelPaths, UsedModel, use_models
 from scenenet.prediction.work.block_file import BlockFile
-from scenenet.prediction.work.point_predictions import PointLookUp, PointPredictions
+from scenenet.prediction.work.point_predictions import (
+    PointLookUp,
+    PointPredictions,
+    TargetTiles,
+)
 from scenenet.prediction.work.structures import Owners, Structures
 from scenenet.prediction.work.survey_system import SurveySystem
 from scenenet.prediction.work.survey_work import SurveyWork
 from scenenet.prediction.work.tile_predictions import TilePredictions
-from scenenet.prediction.work.tile_predictor import (
-    fullest_voxel,
-    observed_voxel_size,
-    predict_file,
-)
+from scenenet.prediction.work.tile_predictor import fullest_voxel, predict_file
 from scenenet.prediction.work.tiling import TileSpool
 from scenenet.prediction.work.work_file import WorkFile, read_file
 from scenenet.prediction.work.work_folder import WorkFolder
@@ -56,22 +59,45 @@ SCRATCH_BYTES = 20
 """Bytes of temporary files for a point: 12 for its position, and up to 3.1 for the voxels, measured
 on airborne and mobile surveys."""
 
+FURTHER_SCRATCH_BYTES = 10
+"""Bytes of temporary files for a point, for each further model: its voxels, which may be as many as
+the points, and their predictions."""
+
+
+@dataclass(frozen=True)
+class FurtherModel:
+    """A model of a prediction besides the first one, with what it predicts.
+
+    Attributes:
+        used: the model.
+        spool: the voxels of the survey that it observes.
+        tiles: the predictions on disk.
+    """
+
+    used: UsedModel
+    spool: TileSpool
+    tiles: TilePredictions
+
 
 @dataclass(frozen=True)
 class SurveyPrediction:
-    """The predictions of a model for a survey.
+    """The predictions of a model for a survey, or of several models for different targets.
 
     Attributes:
         survey: its files, as they were named.
         files: its files, as they were read.
-        model, card: the model and what its file says about it.
+        model, card: the first model, that of towers if there is one, and what its file says.
         settings, detection: the settings of the prediction.
         system: the coordinates of the survey.
-        spool: its voxels and points, by tiles of voxels.
-        towers: the towers found, highest probability first, in the units of the survey.
+        spool: its voxels, those that the first model observes, and points, by tiles of voxels.
+        towers: the towers found, highest probability first, in the units of the survey; none
+            without a model of towers.
         structures: their shapes, m.
-        tiles: the predictions on disk; they exist inside the ``with`` block of ``predict_survey``.
+        tiles: the predictions of the first model on disk; they exist inside the ``with`` block of
+            ``predict_survey``.
         started: ``time.perf_counter()`` at the start.
+        code: class code for points taken for the target of the first model (``UsedModel``).
+        further: the other models.
     """
 
     survey: SurveyFiles
@@ -86,6 +112,8 @@ class SurveyPrediction:
     structures: Structures
     tiles: TilePredictions
     started: float
+    code: int | None = TOWER_CODE
+    further: tuple[FurtherModel, ...] = ()
 
     @classmethod
     def of(
@@ -99,6 +127,8 @@ class SurveyPrediction:
         settings: PredictSettings,
         detection: DetectionSettings,
         started: float,
+        code: int | None = TOWER_CODE,
+        further: Sequence[FurtherModel] = (),
     ) -> SurveyPrediction:
         """What was read, predicted and found."""
         return cls(
@@ -114,6 +144,8 @@ class SurveyPrediction:
             structures=found.structures,
             tiles=tiles,
             started=started,
+            code=code,
+            further=tuple(further),
         )
 
     @property
@@ -170,7 +202,22 @@ class SurveyPrediction:
     @cached_property
     def points(self) -> PointLookUp:
         """Says what was predicted for a point of the survey."""
-        return PointLookUp(self.tiles, self.structures, self.spool.lattice, self.unit_sizes)
+        models = [_target_tiles(self.tiles, self.spool, self.card, self.code)]
+        models += [
+            _target_tiles(each.tiles, each.spool, each.used.card, each.used.code)
+            for each in self.further
+        ]
+        return PointLookUp(models, self.structures, self.unit_sizes)
+
+    @property
+    def finds_towers(self) -> bool:
+        """Whether towers were looked for."""
+        return self.card.finds.is_tower
+
+    @property
+    def target_names(self) -> tuple[str, ...]:
+        """Names of what was looked for, that of the first model first."""
+        return (self.card.finds.name, *(each.used.target.name for each in self.further))
 
     @cached_property
     def _owners(self) -> Owners:
@@ -182,26 +229,26 @@ class SurveyPrediction:
 
     def taken(self, xyz: np.ndarray) -> np.ndarray:
         """(n,) bool, which points (n, 3) of the survey, in its units, are taken for the target of
-        the model: points of towers for a model of towers, else points in voxels at or above tau."""
-        points = self.look_up(xyz)
-        if self.card.finds.is_tower:
-            return points.tower_id > 0
-        return points.probability >= self.card.threshold()
+        the first model (``PointLookUp.taken``)."""
+        return self.points.taken(self.look_up(xyz), 0)
 
     def look_up(self, xyz: np.ndarray) -> PointPredictions:
-        """Probability, tower id and shares of points (n, 3) of the survey, in its units."""
+        """Probabilities, tower id and shares of points (n, 3) of the survey, in its units."""
         return self.points(xyz)
 
 
 @contextmanager
 def predict_survey(
     survey: str | Path | SurveyFiles,
-    model: str | Path,
+    models: ModelPaths,
     settings: PredictSettings,
     detection: DetectionSettings,
     work: WorkFolder | None = None,
+    scheme: ClassScheme | None = None,
 ) -> Iterator[SurveyPrediction]:
     """Predict every occupied voxel of a survey and, with a model of towers, find its towers.
+
+    Several models find different targets. The survey is decoded once, for all of them.
 
     All files of a survey are read before towers are searched for, so the result does not depend on
     where the survey was cut. Memory is bounded by a chunk of points and a tile of voxels. The
@@ -215,48 +262,63 @@ def predict_survey(
     Args:
         survey: LAS, LAZ, COPC or TS40K sample; a folder, a pattern or a tile index of LAS and LAZ
             files, of which one that cannot be used has its error in ``files``.
-        model: model file with tau.
+        models: model file with tau, or several for different targets.
         work: folder for the files between the stages, with those of an earlier call that was
             stopped; None for a temporary one.
+        scheme: of the class codes in the survey (``use_models``).
 
     Raises:
-        InputError: the survey or the model cannot be used.
+        InputError: the survey or a model cannot be used.
         OutputError: the disk of the temporary files has too little space.
     """
-    from scenenet.models.model_file import read_model
-
     started = time.perf_counter()
     if not isinstance(survey, SurveyFiles):
         survey = SurveyFiles.of(survey)
-    trained, card = read_model(model)
-    tau = card.threshold()  # fail before the work: without tau there is no tower
-    voxel_size = observed_voxel_size(trained, card, settings)
+    used = use_models(models, settings, scheme)
+    first, tau = used[0], used[0].card.threshold()
+    sizes = list(dict.fromkeys(each.voxel_size for each in used))
     headers, _ = look_at(survey)
-    size = SCRATCH_BYTES * sum(info.n_points for info in headers.values())
+    size = scratch_bytes(len(used)) * sum(info.n_points for info in headers.values())
     place = temporary_directory() if work is None else work.folder
     check_space({place: size - (0 if work is None else work.bytes_kept())})
     with nullcontext(work) if work is not None else _scratch() as folder:
-        _read_files(survey, folder, voxel_size, settings.chunk_points)
+        _read_files(survey, folder, sizes, settings.chunk_points)
         joined = SurveyWork.open(survey, folder.reads(survey))
-        tiles = _predict_files(joined, folder, trained, card)
-        if not folder.towers.exists() and not card.finds.is_tower:
-            write_json(folder.towers, FoundTowers.none().to_json())
-        if not folder.towers.exists():
-            label = f"{survey.given.name}: candidates measured"
-            sizes = joined.system.unit_sizes
-            found = find_in_survey(joined.spool, tiles, sizes, tau, detection, label)
-            write_json(folder.towers, found.to_json())
-        found = FoundTowers.from_json(read_json(folder.towers))
+        tiles = [_predict_files(joined, folder, each) for each in used]
+        found = FoundTowers.none()
+        if first.target.is_tower:
+            if not folder.towers.exists():
+                label = f"{survey.given.name}: candidates measured"
+                units = joined.system.unit_sizes
+                found = find_in_survey(joined.spool, tiles[0], units, tau, detection, label)
+                write_json(folder.towers, found.to_json())
+            found = FoundTowers.from_json(read_json(folder.towers))
         yield SurveyPrediction.of(
             joined,
-            tiles,
+            tiles[0],
             found,
-            model=trained,
-            card=card,
+            model=first.model,
+            card=first.card,
             settings=settings,
             detection=detection,
             started=started,
+            code=first.code,
+            further=[
+                FurtherModel(each, joined.spool_at(each.voxel_size), predicted)
+                for each, predicted in zip(used[1:], tiles[1:], strict=True)
+            ],
         )
+
+
+def scratch_bytes(n_models: int) -> int:
+    """Bytes of temporary files for a point, with a number of models."""
+    return SCRATCH_BYTES + FURTHER_SCRATCH_BYTES * (n_models - 1)
+
+
+def _target_tiles(
+    tiles: TilePredictions, spool: TileSpool, card: ModelCard, code: int | None
+) -> TargetTiles:
+    return TargetTiles(tiles, spool.lattice, card.finds, card.threshold(), code)
 
 
 @contextmanager
@@ -266,30 +328,32 @@ def _scratch() -> Iterator[WorkFolder]:
 
 
 def _read_files(
-    survey: SurveyFiles, folder: WorkFolder, voxel_size: float, chunk_points: int
+    survey: SurveyFiles, folder: WorkFolder, voxel_sizes: Sequence[float], chunk_points: int
 ) -> None:
-    """Read the files that are not in ``folder`` yet."""
+    """Read the files that are not in ``folder`` yet, for voxels of different sizes, m; points are
+    kept in tiles of those of the first size."""
+    size, *further = voxel_sizes
     names, reads = survey.names, folder.reads(survey)
 
     def read(path: Path) -> None:
-        read_file(path, names[path], reads[path], voxel_size, chunk_points, survey.crs)
+        named = path, names[path], reads[path]
+        read_file(*named, size, chunk_points, survey.crs, further=further)
 
     left = [path for path, out in reads.items() if not out.exists()]
     _each(left, f"{survey.given.name}: files read", read)
 
 
-def _predict_files(
-    joined: SurveyWork, folder: WorkFolder, model: VoxelModel, card: ModelCard
-) -> TilePredictions:
+def _predict_files(joined: SurveyWork, folder: WorkFolder, used: UsedModel) -> TilePredictions:
     """Predict the tiles of the files that are not in ``folder`` yet; each tile once."""
-    fullest = fullest_voxel(joined.spool, card)
+    spool = joined.spool_at(used.voxel_size)
+    fullest = fullest_voxel(spool, used.card)
     files: list[BlockFile] = []
     done: set[int] = set()
 
     def predict(work: WorkFile) -> None:
-        out = folder.predicted(work.file.name)
+        out = folder.predicted(work.file.name, used.target)
         if not out.exists():
-            predict_file(work, joined.spool, out, model, card, fullest, done=done)
+            predict_file(work, spool, out, used.model, used.card, fullest, done=done)
         files.append(BlockFile(out))
         done.update(files[-1].codes("predictions"))
 

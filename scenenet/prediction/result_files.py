@@ -13,7 +13,7 @@ from scenenet.core.provenance import fingerprint
 from scenenet.core.scratch import temporary_directory
 from scenenet.pointcloud.copc import SUFFIX
 from scenenet.prediction.page.survey_page import PAGE_BYTES
-from scenenet.prediction.predict import SCRATCH_BYTES
+from scenenet.prediction.predict import scratch_bytes
 from scenenet.prediction.survey_files import SurveyFiles, result_name
 from scenenet.prediction.work.work_folder import WorkFolder
 
@@ -32,7 +32,8 @@ class PredictionFiles:
     Attributes:
         points: file of the survey -> the same points with the dimensions of ``point_dimensions``
             (LAZ).
-        geopackage, geojson, table: the tower list (``scenenet.prediction.tower_lists``).
+        geopackage, geojson, table: the tower list (``scenenet.prediction.tower_lists``); the last
+            two are None where no towers are looked for, and the GeoPackage has its other layers.
         summary: ``PredictionSummary`` (JSON).
         page: the page of the survey (HTML); None for no page.
         status: a row per file of the survey (CSV); None for a survey that is one file.
@@ -41,17 +42,24 @@ class PredictionFiles:
 
     points: Mapping[Path, Path]
     geopackage: Path
-    geojson: Path
-    table: Path
+    geojson: Path | None
+    table: Path | None
     summary: Path
     page: Path | None = None
     status: Path | None = None
     copc: bool = False
 
     @classmethod
-    def of(cls, survey: SurveyFiles | Path, folder: Path, *, copc: bool = False) -> PredictionFiles:
+    def of(
+        cls, survey: SurveyFiles | Path, folder: Path, *, copc: bool = False, towers: bool = True
+    ) -> PredictionFiles:
         """The files that the command line writes for a survey. The points of one with several files
-        are in a folder with its name, with its status."""
+        are in a folder with its name, with its status.
+
+        Args:
+            copc: whether points are also written as COPC.
+            towers: whether towers are looked for.
+        """
         if not isinstance(survey, SurveyFiles):
             survey = SurveyFiles.of(survey)
         place = folder / survey.name if survey.tiled else folder
@@ -63,10 +71,10 @@ class PredictionFiles:
         return cls(
             points,
             geopackage=folder / f"{survey.name}.gpkg",
-            geojson=folder / f"{survey.name}.towers.geojson",
-            table=folder / f"{survey.name}.towers.csv",
+            geojson=folder / f"{survey.name}.towers.geojson" if towers else None,
+            table=folder / f"{survey.name}.towers.csv" if towers else None,
             summary=folder / f"{survey.name}{SUMMARY}",
-            page=folder / f"{survey.name}.html",
+            page=folder / f"{survey.name}.html" if towers else None,
             status=place / "status.csv" if survey.tiled else None,
             copc=copc,
         )
@@ -85,6 +93,15 @@ class PredictionFiles:
                 Output(copc_of(path), self.is_own, file) for file, path in self.points.items()
             ]
         return points + lists
+
+    def outdated(self) -> list[Path]:
+        """Lists and pages of towers that an earlier prediction wrote and this one does not."""
+        if self.table is not None:
+            return []
+        name = self.summary.name.removesuffix(SUMMARY)
+        endings = (".towers.geojson", ".towers.csv", ".html")
+        paths = (self.summary.with_name(name + ending) for ending in endings)
+        return [path for path in paths if path.exists() and self.is_own(path)]
 
     def is_own(self, path: Path) -> bool:
         """Whether ``path`` is as an earlier prediction wrote it; its summary is the record, and
@@ -128,11 +145,14 @@ def copc_of(points: Path) -> Path:
     return points.with_suffix(SUFFIX)
 
 
-def require_space(surveys: Sequence[tuple[PredictionFiles, Mapping[Path, int]]]) -> None:
+def require_space(
+    surveys: Sequence[tuple[PredictionFiles, Mapping[Path, int]]], n_models: int = 1
+) -> None:
     """Check that the disks have room for all results, and for the temporary files of one survey.
 
     Args:
         surveys: for each survey, its results, and its files with the number of points of each.
+        n_models: number of models.
 
     Raises:
         OutputError: a disk has too little space.
@@ -140,7 +160,7 @@ def require_space(surveys: Sequence[tuple[PredictionFiles, Mapping[Path, int]]])
     needs: dict[Path, int] = {}
     scratch: dict[Path, int] = {}
     for files, points in surveys:
-        size = sum(path.stat().st_size + RESULT_BYTES * n for path, n in points.items())
+        size = sum(path.stat().st_size + RESULT_BYTES * n_models * n for path, n in points.items())
         page = 0 if files.page is None else PAGE_BYTES
         out = files.summary.parent
         there = sum(path.stat().st_size for path in files.points.values() if path.exists())
@@ -148,7 +168,7 @@ def require_space(surveys: Sequence[tuple[PredictionFiles, Mapping[Path, int]]])
         place, kept = temporary_directory(), 0
         if files.work is not None:
             place, kept = out, WorkFolder(files.work).bytes_kept()
-        left = max(0, SCRATCH_BYTES * sum(points.values()) - kept)
+        left = max(0, scratch_bytes(n_models) * sum(points.values()) - kept)
         scratch[place] = max(scratch.get(place, 0), left)
     both = [*needs, *(place for place in scratch if place not in needs)]
     check_space({path: needs.get(path, 0) + scratch.get(path, 0) for path in both})

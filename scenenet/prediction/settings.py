@@ -30,6 +30,6 @@ class PredictSettings(Settings):
     )
     classify_from: tuple[ClassByte, ...] | None = Field(
         None,
-        description="class codes that may become 15; null for every code. Points with another code "
-        "keep it",
+        description="class codes that may be replaced; null for every code. Points with another "
+        "code keep it",
     )

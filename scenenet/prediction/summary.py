@@ -6,7 +6,7 @@ It imports neither torch nor the models, so that figures and the report do not d
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 
@@ -18,7 +18,7 @@ class PredictionSummary:
         survey: path of the survey, as given.
         model: name of the model.
         points: number of points.
-        towers: number of towers.
+        towers: number of towers; None if no model finds towers.
         tau: detection threshold.
         voxel_size_m: m.
         kernel_size: (kz, ky, kx) in voxels.
@@ -33,12 +33,14 @@ class PredictionSummary:
         model_provenance: provenance of the model.
         outputs: path -> fingerprint of the classified points, the tower lists and the page. A
             later prediction replaces these files only if they are unchanged.
+        targets: of each model, that of the attributes above first: its target, name, tau, voxel
+            size (m), kernel size (voxels) and the number of points taken for the target.
     """
 
     survey: str
     model: str
     points: int
-    towers: int
+    towers: int | None
     tau: float
     voxel_size_m: float
     kernel_size: list[int]
@@ -52,6 +54,7 @@ class PredictionSummary:
     settings: dict[str, Any]
     model_provenance: dict[str, Any]
     outputs: dict[str, str]
+    targets: list[dict[str, Any]] = field(default_factory=list)
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -61,6 +64,8 @@ class PredictionSummary:
         """The summary that ``to_json`` gave.
 
         Raises:
-            KeyError: a value is missing. Values that this version does not know are ignored.
+            KeyError: a value is missing, other than ``targets``, which earlier versions did not
+                write. Values that this version does not know are ignored.
         """
-        return cls(**{field.name: data[field.name] for field in fields(cls)})
+        known = {"targets": [], **data}
+        return cls(**{each.name: known[each.name] for each in fields(cls)})

@@ -41,7 +41,8 @@ def write_tiles(
                 written |= facts["outputs"]
                 write_json(files.unfinished, written)
                 write_json(work.written, done)
-                file = replace(file, towers=facts["towers"], tower_points=facts["tower_points"])
+                counts = ("towers", "tower_points", "target_points")
+                file = replace(file, **{name: facts[name] for name in counts})
             except OutputError:
                 raise
             except InputError as error:
@@ -72,7 +73,12 @@ def _write_tile(
             write_copc(target, partial)
             outputs[files.key(copc)] = fingerprint(partial)
             write_json(files.unfinished, {**written, **outputs})
-    return {"outputs": outputs, "towers": counted.towers, "tower_points": counted.tower_points}
+    return {
+        "outputs": outputs,
+        "towers": counted.towers,
+        "tower_points": counted.tower_points,
+        "target_points": dict(counted.target_points),
+    }
 
 
 def _is_as_written(files: PredictionFiles, outputs: Mapping[str, str]) -> bool:

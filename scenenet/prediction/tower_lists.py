@@ -74,12 +74,13 @@ def write_geojson(
 
 def write_geopackage(
     path: str | Path,
-    towers: Sequence[SurveyTower],
+    towers: Sequence[SurveyTower] | None,
     geneos: Sequence[str],
     crs: pyproj.CRS | None,
     unit_sizes: tuple[float, float, float],
     spool: TileSpool,
     files: Sequence[SurveyFile],
+    targets: Sequence[str],
 ) -> None:
     """Write the tower list as a GeoPackage in the CRS of the survey, with styles for QGIS.
 
@@ -88,31 +89,35 @@ def write_geopackage(
 
     Args:
         path: ends in ``.gpkg``.
+        towers: None if none were looked for; there is no layer ``towers`` then.
         geneos: names of the GENEOs of the model.
         crs: of the survey; None if it is not known.
         unit_sizes: sizes in m of the units of its x, y and z.
         spool: the occupied voxels of the survey.
         files: of the survey, a row each in the layer ``tiles``.
+        targets: names of what was looked for.
     """
     import shapely
 
-    rows = [tower.to_row() for tower in towers]
-    # The types make the columns of an empty list the same as those of a full one.
-    fields: dict[str, np.ndarray] = {
-        name: np.array([row[name] for row in rows], dtype=object if kind is str else kind)
-        for name, kind in row_types(geneos).items()
-    }
-    feet = np.array([(tower.x, tower.y, tower.base) for tower in towers]).reshape(-1, 3)
     parts = shapely.get_parts(coverage(spool))
     area = shapely.area(parts)
     parts = shapely.transform(parts, lambda xy: xy / unit_sizes[0])
     extents = [shapely.Polygon() if f.extent is None else shapely.box(*f.extent) for f in files]
-    facts = [file.to_json() for file in files]
+    facts = [file.to_json(targets) for file in files]
     attributes = {name: np.array([row[name] for row in facts]) for name in facts[0]}
-    _write_layer(path, "towers", "Point Z", shapely.points(feet), fields, crs)
+    if towers is not None:
+        rows = [tower.to_row() for tower in towers]
+        # The types make the columns of an empty list the same as those of a full one.
+        fields: dict[str, np.ndarray] = {
+            name: np.array([row[name] for row in rows], dtype=object if kind is str else kind)
+            for name, kind in row_types(geneos).items()
+        }
+        feet = np.array([(tower.x, tower.y, tower.base) for tower in towers]).reshape(-1, 3)
+        _write_layer(path, "towers", "Point Z", shapely.points(feet), fields, crs)
     _write_layer(path, "coverage", "Polygon", parts, {"area_m2": area}, crs)
     _write_layer(path, "tiles", "Polygon", extents, attributes, crs)
-    _add_styles(path)
+    drawn = [layer for layer in STYLES if layer != "towers" or towers is not None]
+    _add_styles(path, drawn)
 
 
 def coverage(spool: TileSpool) -> Any:
@@ -169,8 +174,8 @@ def _write_layer(
         )
 
 
-def _add_styles(path: str | Path) -> None:
-    """Add the table from which QGIS takes the styles of the layers."""
+def _add_styles(path: str | Path, layers: Iterable[str]) -> None:
+    """Add the table from which QGIS takes the styles of ``layers``."""
     with closing(sqlite3.connect(path)) as database, database:
         database.execute(
             "CREATE TABLE layer_styles (id INTEGER PRIMARY KEY, f_table_catalog TEXT, "
@@ -187,5 +192,5 @@ def _add_styles(path: str | Path) -> None:
             "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
             "f_geometry_column, styleName, styleQML, styleSLD, useAsDefault, update_time) "
             "VALUES ('', '', ?, 'geom', ?, ?, '', 1, ?)",
-            [(layer, layer, style, WRITTEN) for layer, style in STYLES.items()],
+            [(layer, layer, STYLES[layer], WRITTEN) for layer in layers],
         )

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import sys
 import time
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, write_json
 from scenenet.core.provenance import fingerprint, package_version
 from scenenet.detection.settings import DetectionSettings
+from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.copc import write_copc
 from scenenet.prediction.file_status import write_status
 from scenenet.prediction.page.survey_page import write_page
@@ -21,16 +24,18 @@ from scenenet.prediction.summary import PredictionSummary
 from scenenet.prediction.survey_files import SurveyFiles
 from scenenet.prediction.tile_results import write_file, write_tiles
 from scenenet.prediction.tower_lists import write_csv, write_geojson, write_geopackage
+from scenenet.prediction.used_models import ModelPaths, paths_of, use_models
 from scenenet.prediction.work.work_folder import WorkFolder, resumable
 
 
 def predict_to_files(
     survey: str | Path | SurveyFiles,
-    model: str | Path,
+    models: ModelPaths,
     files: PredictionFiles,
     settings: PredictSettings,
     detection: DetectionSettings,
     code: str | None = None,
+    scheme: ClassScheme | None = None,
 ) -> PredictionSummary:
     """Predict a survey and write the classified points, the tower list and the summary.
 
@@ -42,23 +47,36 @@ def predict_to_files(
     Args:
         survey: LAS, LAZ, COPC or TS40K sample; a folder, a pattern or a tile index of LAS and LAZ
             files.
-        model: model file with tau.
-        files: to write.
+        models: model file with tau, or several for different targets.
+        files: to write; without tower lists and page if no model finds towers.
         code: digest of the code; a run goes on where one with the same code was stopped. None for
             the version of the package.
+        scheme: of the class codes in the survey (``scenenet.prediction.used_models.use_models``).
 
     Raises:
-        InputError: the survey or the model cannot be used.
+        InputError: the survey or a model cannot be used, or ``files`` has tower lists and no model
+            finds towers.
         OutputError: a file cannot be written.
     """
     if not isinstance(survey, SurveyFiles):
         survey = SurveyFiles.of(survey)
+    first, *_ = use_models(models, settings, scheme)
+    if files.table is not None and not first.target.is_tower:
+        raise InputError(
+            f"it finds {first.target.name}, and a list of towers needs a model of towers",
+            file=first.path,
+            remedy="Name a model of towers as well",
+        )
     with ExitStack() as stack:
         work = None
         if files.work is not None:
-            made_by = _made_by(survey, model, settings, detection, code or package_version())
+            made_by = _made_by(
+                survey, models, settings, detection, code or package_version(), scheme
+            )
             work = stack.enter_context(resumable(files.work, survey, made_by))
-        prediction = stack.enter_context(predict_survey(survey, model, settings, detection, work))
+        prediction = stack.enter_context(
+            predict_survey(survey, models, settings, detection, work, scheme)
+        )
         prediction.warn()
         return _write_all(prediction, files, work)
 
@@ -69,6 +87,7 @@ def _write_all(
     """Write the points, then the lists, then the summary."""
     with ExitStack() as stack:
         written: dict[str, str] = {}
+        outdated = files.outdated()
         if work is not None:
             read = write_tiles(prediction, files, written, work)
         else:
@@ -83,6 +102,9 @@ def _write_all(
                 written[files.key(copc_of(target))] = fingerprint(copc)
         summary = _write_lists(stack, replace(prediction, files=read), files, written)
     files.unfinished.unlink(missing_ok=True)
+    for path in outdated:
+        print(f"{path}: removed, because no towers were looked for this time", file=sys.stderr)
+        path.unlink(missing_ok=True)
     return summary
 
 
@@ -108,12 +130,16 @@ def _write_lists(
     """Write the tower list, the status and the summary; they appear when ``stack`` is left."""
     lists = {path: stack.enter_context(atomic(path)) for path in files.lists}
     record = stack.enter_context(atomic(files.summary))
-    of_towers = (files.geopackage, files.geojson, files.table)
-    write_towers(prediction, *(lists[path] for path in of_towers))
+    write_layers(prediction, lists[files.geopackage])
+    if files.geojson is not None:
+        crs, sizes = prediction.crs, prediction.unit_sizes
+        write_geojson(lists[files.geojson], prediction.towers, crs, sizes)
+    if files.table is not None:
+        write_csv(lists[files.table], prediction.towers, prediction.geneos)
     if files.page is not None:
         write_page(prediction, lists[files.page])
     if files.status is not None:
-        write_status(lists[files.status], prediction.files)
+        write_status(lists[files.status], prediction.files, prediction.target_names)
     prints = {files.key(path): fingerprint(partial) for path, partial in lists.items()}
     summary = summarise(prediction, written | prints)
     write_json(record, summary.to_json())
@@ -122,14 +148,16 @@ def _write_lists(
 
 def _made_by(
     survey: SurveyFiles,
-    model: str | Path,
+    models: ModelPaths,
     settings: PredictSettings,
     detection: DetectionSettings,
     code: str,
+    scheme: ClassScheme | None,
 ) -> dict[str, Any]:
     """All that decides on the results of a survey besides its files, as JSON holds it."""
     return {
-        "model": fingerprint(model),
+        "models": [fingerprint(path) for path in paths_of(models)],
+        "scheme": None if scheme is None else scheme.name,
         "settings": settings.model_dump(mode="json"),
         "detection": detection.model_dump(mode="json"),
         "crs": None if survey.crs is None else survey.crs.srs,
@@ -137,16 +165,18 @@ def _made_by(
     }
 
 
-def write_towers(
-    prediction: SurveyPrediction, geopackage: Path, geojson: Path, table: Path
-) -> None:
-    """Write the tower list in each of its formats."""
-    towers, geneos = prediction.towers, prediction.geneos
-    crs, sizes = prediction.crs, prediction.unit_sizes
-    spool, files = prediction.spool, prediction.files
-    write_geopackage(geopackage, towers, geneos, crs, sizes, spool, files)
-    write_geojson(geojson, towers, crs, sizes)
-    write_csv(table, towers, geneos)
+def write_layers(prediction: SurveyPrediction, geopackage: Path) -> None:
+    """Write the layers of the GeoPackage."""
+    write_geopackage(
+        geopackage,
+        prediction.towers if prediction.finds_towers else None,
+        prediction.geneos,
+        prediction.crs,
+        prediction.unit_sizes,
+        prediction.spool,
+        prediction.files,
+        prediction.target_names,
+    )
 
 
 def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> PredictionSummary:
@@ -157,7 +187,7 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         survey=str(prediction.survey.given),
         model=prediction.card.name,
         points=prediction.n_points,
-        towers=len(prediction.towers),
+        towers=len(prediction.towers) if prediction.finds_towers else None,
         tau=prediction.card.threshold(),
         voxel_size_m=prediction.voxel_size,
         kernel_size=list(prediction.model.kernel_size),
@@ -169,9 +199,34 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
             *prediction.survey.notes,
             *(text for file in prediction.files for text in file.warnings),
         ],
-        files=[file.to_json() for file in prediction.files],
+        files=[file.to_json(prediction.target_names) for file in prediction.files],
         seconds=time.perf_counter() - prediction.started,
         settings=prediction.settings.model_dump() | detection,
         model_provenance=prediction.card.provenance,
         outputs=outputs,
+        targets=_targets(prediction),
     )
+
+
+def _targets(prediction: SurveyPrediction) -> list[dict[str, Any]]:
+    """What ``PredictionSummary.targets`` says about each model."""
+    first = prediction.card, prediction.model, prediction.voxel_size
+    others = ((f.used.card, f.used.model, f.used.voxel_size) for f in prediction.further)
+    facts = []
+    for card, model, voxel_size in (first, *others):
+        target = card.finds
+        points = sum(
+            file.tower_points if target.is_tower else file.target_points.get(target.name, 0)
+            for file in prediction.files
+        )
+        facts.append(
+            {
+                "target": card.target,
+                "model": card.name,
+                "tau": card.threshold(),
+                "voxel_size_m": voxel_size,
+                "kernel_size": list(model.at(voxel_size).kernel_size),
+                "points": points,
+            }
+        )
+    return facts

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from scenenet.core.errors import InputError
 from scenenet.core.files import write_text
 from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
@@ -25,6 +26,7 @@ from scenenet.prediction.file_status import readable
 from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
+from scenenet.prediction.used_models import use_models
 from scenenet.prediction.work.survey_system import in_metres
 from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section, Text, table, write
 from scenenet.report.page import render
@@ -69,6 +71,13 @@ def explain_survey(
     """
     if not isinstance(survey, SurveyFiles):
         survey = SurveyFiles.of(survey)
+    [used] = use_models(model, settings)
+    if not used.target.is_tower:
+        raise InputError(
+            f"it finds {used.target.name}, and only towers are explained",
+            file=model,
+            remedy="Name a model of towers",
+        )
     headers, _ = look_at(survey)
     points = sum(info.n_points for info in headers.values())
     page = FIRST_TOWER_BYTES + POINT_BYTES * points

@@ -85,6 +85,7 @@ def _seed_record(
             "kind": result.kind,
             "seed": str(result.seed),
             "alive": str(result.alive).lower(),
+            "target": result.evaluation.target,
             **origin_tags(provenance),
         },
         artifacts={f"model/{path.name}": path for path in result.model_files},
@@ -131,6 +132,7 @@ def _model(result: SeedResult) -> ModelRecord | None:
     if not result.model_files:
         return None
     tags = {"model": result.model, "kind": result.kind, "seed": str(result.seed)}
+    tags["target"] = result.evaluation.target
     return ModelRecord(f"{result.model}-seed-{result.seed}", result.model_files[0], tags)
 
 
@@ -243,6 +245,7 @@ def _parent_record(
             **base,
             "model": model,
             "kind": trained[0].kind,
+            "target": trained[0].evaluation.target,
             NOTE_TAG: _note(trained, len(live)),
         },
         artifacts={f"figures/{picture.file.name}": picture.file for picture in pictures},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import laspy
 import numpy as np
 import pytest
 from fixtures.scenes import POLE_TAU, model_card
@@ -111,3 +112,23 @@ def test_a_target_that_does_not_exist_is_a_usage_error(files, tmp_path, call):
                   tmp_path / "m.json")  # fmt: skip
     assert called.code == 2
     assert "there is no target 'wires'" in called.err
+
+
+def test_wires_are_classified_only_by_a_named_scheme(files, pole_finder, tmp_path, call):
+    write_model(tmp_path / "wire.json", pole_finder[0], model_card(target="wire"))
+    given = "predict", files / "s.laz", "--model", tmp_path / "wire.json", "--out", tmp_path / "o"
+    refused = call(*given, "--classify")
+    assert refused.code == 2
+    assert "needs the class scheme of the survey" in refused.err
+    called = call(*given, "--classify", "--codes", "asprs")
+    assert called.code == 0
+    assert "towers were not looked for" in called.out
+    codes = np.asarray(laspy.read(tmp_path / "o" / "s.laz").classification)
+    assert f"{(codes == 14).sum():,} wire points" in called.out
+
+
+def test_only_towers_are_explained(files, tmp_path, call):
+    refused = call("explain", files / "s.laz", "--model", files / "pole.json", "--out",
+                   tmp_path / "e.html")  # fmt: skip
+    assert refused.code == 1
+    assert "it finds pole, and only towers are explained" in refused.err

@@ -74,7 +74,7 @@ def test_points_in_the_shapes_of_two_towers_belong_to_the_first(opened):
     [(number, structure)] = prediction.structures.numbered
     beside = structure.moved(-0.25, 0.0, 0.0)
     both = Structures(((1, beside), (number, structure)))
-    look_up = PointLookUp(prediction.tiles, both, prediction.spool.lattice, prediction.unit_sizes)
+    look_up = PointLookUp(prediction.points.models, both, prediction.unit_sizes)
     numbers = look_up(cloud.xyz).tower_id[own]
     in_first = beside.contains(cloud.xyz[own])
     assert 0 < in_first.sum() < own.sum()

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
+    Codes,
     Kernels,
     MinConductor,
-    ModelFile,
+    ModelFiles,
     Overwrite,
     Surveys,
     System,
@@ -20,17 +21,30 @@ from scenenet.cli.options import (
     detection_settings,
 )
 from scenenet.cli.output import show
+from scenenet.models.packaged import packaged_model
+from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme, class_scheme
+from scenenet.pointcloud.targets import Target
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.used_models import UsedModel
 
 EXAMPLES = (
     "scenenet predict line.laz --out predicted",
     "scenenet predict tiles/ --out predicted",
     "scenenet predict surveys/*.laz --model model.json --out predicted --json",
+    "scenenet predict line.laz --model model.json --model wire.json --out predicted",
 )
+
+
+_WIRE_CODES = ", ".join(f"{name} {each.main_code('conductor')}" for name, each in SCHEMES.items())
 
 
 def command(
     surveys: Surveys,
-    model: ModelFile,
+    model: ModelFiles,
     out: Annotated[Path, typer.Option("--out", help="Folder for the results.")],
     voxel_size: Annotated[
         float | None,
@@ -44,14 +58,24 @@ def command(
     classify: Annotated[
         bool,
         typer.Option(
-            "--classify", help="Give the points of towers the class code 15 (schemes asprs, edp)."
+            "--classify",
+            help="Give the points of towers the class code 15 (schemes asprs, edp), and with a "
+            "model of target wire the points of wires that of --codes.",
         ),
     ] = False,
+    codes: Annotated[
+        Codes | None,
+        typer.Option(
+            "--codes",
+            help="With --classify and a model of target wire: class scheme of the survey, whose "
+            f"code wires get ({_WIRE_CODES}).",
+        ),
+    ] = None,
     classify_from: Annotated[
         str | None,
         typer.Option(
             metavar="CODES",
-            help="With --classify: the class codes that may become 15, such as 0,1,5.  [default: "
+            help="With --classify: the class codes that may be replaced, such as 0,1,5.  [default: "
             "every code]",
         ),
     ] = None,
@@ -64,7 +88,7 @@ def command(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Find the towers of surveys and classify every point.
+    """Find the towers of surveys, or another target of a model, and classify every point.
 
     A survey is a file, a folder of LAS and LAZ files, a pattern such as 'tiles/*.laz' in quotes, or
     a tile index: a virtual point cloud (.vpc), a STAC item collection (.json) or a GeoPackage with
@@ -73,8 +97,9 @@ def command(
     Each survey NAME gives these files in the folder --out:
 
     NAME.laz: all points of the survey, in order, each with the probability of a tower, the id of
-    its tower (0 for none) and the share of each GENEO. A survey of several files has a folder NAME
-    with a file for each, and status.csv with a row for each.
+    its tower (0 for none) and the share of each GENEO. A model of another target gives
+    TARGET_probability and TARGET_GENEO. A survey of several files has a folder NAME with a file for
+    each, and status.csv with a row for each.
 
     NAME.gpkg: the towers, the coverage and the file as layers, in the CRS of the survey, with
     styles for QGIS.
@@ -88,6 +113,9 @@ def command(
 
     NAME.summary.json: counts, settings and time.
 
+    Without a model of towers there is no list of towers and no page, and the number of towers in
+    the summary is null.
+
     A file that exists is replaced only if an earlier prediction wrote it and nothing changed it.
 
     The exit code is 1 if a survey fails; the other surveys are still predicted.
@@ -100,26 +128,32 @@ def command(
     from scenenet.prediction.result_files import PredictionFiles, require_space
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles, look_at
+    from scenenet.prediction.used_models import use_models
 
     settings = PredictSettings(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
     )
+    scheme = None if codes is None else class_scheme(codes.value)
     system = coordinate_system(crs)
     if copc:
         require_pdal()
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
-    files = {given: PredictionFiles.of(survey, out, copc=copc) for given, survey in named.items()}
+    towers = model == [packaged_model()]
+    if named and not towers:  # it loads torch, which takes seconds
+        used = use_models(model, settings, scheme)
+        _require_codes(used, settings, scheme)
+        towers = used[0].target.is_tower
+    files = {
+        given: PredictionFiles.of(survey, out, copc=copc, towers=towers)
+        for given, survey in named.items()
+    }
     outputs = [output for each in files.values() for output in each.outputs()]
     inputs = [path for survey in named.values() for path in (survey.given, *survey.files)]
-    check_outputs(outputs, [*inputs, model], overwrite=overwrite)
+    check_outputs(outputs, [*inputs, *model], overwrite=overwrite)
     seen = failures.look_at(named, lambda given: look_at(named[given])[0])
-    if seen:  # it loads torch, which takes seconds
-        from scenenet.models.model_file import read_model
-
-        read_model(model)[1].threshold()
     points = {g: {path: i.n_points for path, i in headers.items()} for g, headers in seen.items()}
-    require_space([(files[given], counts) for given, counts in points.items()])
+    require_space([(files[given], counts) for given, counts in points.items()], len(model))
     detection = detection_settings(min_conductor)
     tiled = any(named[given].tiled for given in seen)
     code = code_hash([writers.__file__]) if tiled else None
@@ -127,7 +161,7 @@ def command(
     for given in seen:
         with failures.collect():
             summary = writers.predict_to_files(
-                named[given], model, files[given], settings, detection, code
+                named[given], model, files[given], settings, detection, code, scheme
             )
             summaries.append(summary.to_json())
             for file in summary.files:
@@ -136,11 +170,36 @@ def command(
     show(
         summaries,
         as_json,
-        lambda all_: [
-            f"{s['survey']}: {s['towers']} towers among {s['points']:,} points" for s in all_
-        ],
+        lambda all_: [_line(summary) for summary in all_],
     )
     failures.end()
+
+
+def _line(summary: dict[str, Any]) -> str:
+    """What was found in a survey, in a line."""
+    found = [] if summary["towers"] is None else [f"{summary['towers']} towers"]
+    for each in summary["targets"]:
+        target = Target.parse(each["target"])
+        if not target.is_tower:
+            found.append(f"{each['points']:,} {target.name} points")
+    line = f"{summary['survey']}: {', '.join(found)} among {summary['points']:,} points"
+    return line if summary["towers"] is not None else f"{line}; towers were not looked for"
+
+
+def _require_codes(
+    used: Sequence[UsedModel], settings: PredictSettings, scheme: ClassScheme | None
+) -> None:
+    """Refuse to classify wires without the scheme that has their code.
+
+    Raises:
+        typer.BadParameter: there is a model of wires, and no scheme.
+    """
+    if settings.classify and scheme is None and any(each.target.name == "wire" for each in used):
+        raise typer.BadParameter(
+            "--classify with a model of target wire needs the class scheme of the survey "
+            f"({_WIRE_CODES})",
+            param_hint="--codes",
+        )
 
 
 def _codes(classify: bool, text: str | None) -> tuple[int, ...] | None:

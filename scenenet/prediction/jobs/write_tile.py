@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 from scenenet.core.files import atomic, read_json, write_json
 from scenenet.core.provenance import fingerprint, is_still
 from scenenet.core.unchanged import FileState
+from scenenet.prediction.point_dimensions import TOWER_CODE
 from scenenet.prediction.point_writer import write_points
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.block_file import BlockFile
-from scenenet.prediction.work.point_predictions import PointLookUp
+from scenenet.prediction.work.point_predictions import PointLookUp, TargetTiles
 from scenenet.prediction.work.structures import Structures
 from scenenet.prediction.work.survey_system import SurveySystem
 from scenenet.prediction.work.tile_predictions import TilePredictions
@@ -48,12 +49,9 @@ def write_tile(
     """
     own, facts = WorkFile.open(work), read_json(near)
     system = SurveySystem.from_json(facts["system"])
-    look_up = PointLookUp(
-        TilePredictions([BlockFile(predictions)]),
-        Structures.from_json(facts["structures"]),
-        own.lattice,
-        system.unit_sizes,
-    )
+    tiles = TargetTiles(TilePredictions([BlockFile(predictions)]), own.lattice, code=TOWER_CODE)
+    structures = Structures.from_json(facts["structures"])
+    look_up = PointLookUp([tiles], structures, system.unit_sizes)
     file = own.file
     if known is not None and known == own.known and is_still(file.path, known):
         file = replace(file, state=FileState.of(file.path))

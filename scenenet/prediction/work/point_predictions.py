@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.prediction.work.structures import Owners, Structures
 from scenenet.prediction.work.survey_system import in_metres
 from scenenet.prediction.work.tile_predictions import TilePredictions
@@ -13,51 +15,113 @@ from scenenet.prediction.work.tiling import Lattice, groups
 
 
 @dataclass(frozen=True)
-class PointPredictions:
-    """The predictions for points.
+class TargetTiles:
+    """The predictions of a model for the tiles of a survey, and what they are for.
+
+    Attributes:
+        tiles: the predictions, for all tiles with a point that will be asked for.
+        lattice: of its voxels.
+        target: what the model finds.
+        tau: of the model. Which points are taken for towers follows from their shapes instead.
+        code: class code that points taken for the target get where classes are written; None to
+            keep their codes.
+    """
+
+    tiles: TilePredictions
+    lattice: Lattice
+    target: Target = TOWER
+    tau: float = 1.0
+    code: int | None = None
+
+
+@dataclass(frozen=True)
+class TargetPredictions:
+    """The predictions of one model for points.
 
     Attributes:
         probability: (n,) float32.
-        tower_id: (n,) uint32, 0 for no tower.
         shares: (n, K) float32, one column for each GENEO.
     """
 
     probability: np.ndarray
-    tower_id: np.ndarray
     shares: np.ndarray
 
 
+@dataclass(frozen=True)
+class PointPredictions:
+    """The predictions for points.
+
+    Attributes:
+        models: of each model, in the order of ``PointLookUp.models``.
+        tower_id: (n,) uint32, 0 for no tower.
+    """
+
+    models: tuple[TargetPredictions, ...]
+    tower_id: np.ndarray
+
+    @property
+    def probability(self) -> np.ndarray:
+        """(n,) float32, of the first model."""
+        return self.models[0].probability
+
+    @property
+    def shares(self) -> np.ndarray:
+        """(n, K) float32, of the first model."""
+        return self.models[0].shares
+
+
 class PointLookUp:
-    """Says what was predicted for a point."""
+    """Says what was predicted for a point.
+
+    Attributes:
+        models: the predictions of each model for tiles.
+    """
 
     def __init__(
         self,
-        tiles: TilePredictions,
+        models: Sequence[TargetTiles],
         structures: Structures,
-        lattice: Lattice,
         unit_sizes: tuple[float, float, float],
     ) -> None:
         """Sort the structures by place.
 
         Args:
-            tiles: the predictions, for all tiles with a point that will be asked for.
-            structures: all that reach into such a tile.
-            lattice: of the voxels.
+            models: at least one.
+            structures: all that reach into a tile with a point that will be asked for, found by the
+                first model.
             unit_sizes: sizes in m of the units of x, y and z.
         """
-        self.geneos = tiles.geneos
-        self._tiles, self._lattice, self._unit_sizes = tiles, lattice, unit_sizes
-        self._owners = Owners(structures, lattice)
+        self.models = tuple(models)
+        self._unit_sizes = unit_sizes
+        self._owners = Owners(structures, self.models[0].lattice)
 
     def __call__(self, xyz: np.ndarray) -> PointPredictions:
         """The predictions for points (n, 3) of the survey, in its units."""
         xyz = in_metres(xyz, self._unit_sizes)
-        probability = np.zeros(len(xyz), np.float32)
-        shares = np.zeros((len(xyz), len(self.geneos)), np.float32)
-        codes, voxels = self._lattice.locate(xyz)
-        for code, rows in groups(codes):
-            prediction = self._tiles.kept(code)
-            at = np.searchsorted(prediction.voxel, voxels[rows])
-            probability[rows] = prediction.probability[at]
-            shares[rows] = prediction.shares[at]
-        return PointPredictions(probability, self._owners(xyz, codes), shares)
+        located: dict[Lattice, tuple[np.ndarray, np.ndarray]] = {}
+        for model in self.models:
+            if model.lattice not in located:
+                located[model.lattice] = model.lattice.locate(xyz)
+        found = tuple(_look_up(model.tiles, *located[model.lattice]) for model in self.models)
+        codes, _ = located[self.models[0].lattice]
+        return PointPredictions(found, self._owners(xyz, codes))
+
+    def taken(self, points: PointPredictions, number: int) -> np.ndarray:
+        """(n,) bool, which points are taken for the target of the model with a number: points of
+        towers, or for another target those in voxels at or above tau."""
+        model = self.models[number]
+        if model.target.is_tower:
+            return points.tower_id > 0
+        return points.models[number].probability >= model.tau
+
+
+def _look_up(tiles: TilePredictions, codes: np.ndarray, voxels: np.ndarray) -> TargetPredictions:
+    """What ``tiles`` say about points in the voxels (n,) of the tiles with ``codes`` (n,)."""
+    probability = np.zeros(len(codes), np.float32)
+    shares = np.zeros((len(codes), len(tiles.geneos)), np.float32)
+    for code, rows in groups(codes):
+        prediction = tiles.kept(code)
+        at = np.searchsorted(prediction.voxel, voxels[rows])
+        probability[rows] = prediction.probability[at]
+        shares[rows] = prediction.shares[at]
+    return TargetPredictions(probability, shares)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scenenet.prediction.file_status import SurveyFile, readable
 from scenenet.prediction.survey_files import SurveyFiles, in_other_system, nothing_to_use
-from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.tiling import Lattice, TileSpool, further_voxels
 from scenenet.prediction.work.work_file import SurveySystem, WorkFile
 
 
@@ -58,6 +58,14 @@ class SurveyWork:
         used = tuple(belonging(works.values(), system))
         spool = TileSpool(used[0].lattice, (work.blocks for work in used))
         return cls(survey, files, used, system, spool)
+
+    def spool_at(self, voxel_size: float) -> TileSpool:
+        """The voxels of another size, m, of all ``used``; the file was read for them too
+        (``read_file``)."""
+        if voxel_size == self.spool.voxel_size:
+            return self.spool
+        blocks = (work.blocks for work in self.used)
+        return TileSpool(Lattice(voxel_size), blocks, further_voxels(voxel_size))
 
 
 def belonging(works: Iterable[WorkFile], system: SurveySystem) -> Iterator[WorkFile]:

@@ -53,7 +53,7 @@ def predict_file(
     Raises:
         OutputError: ``out`` cannot be written.
     """
-    codes = sorted(code for code in own.blocks.codes("voxels") if code not in done)
+    codes = sorted(code for code in own.blocks.codes(spool.kind) if code not in done)
     tiles = (spool.tile(code) for code in codes)
     predict = TilePredictor(model, card.measurement, spool.voxel_size, fullest)
     with atomic(out) as partial, partial.open("wb") as stream:

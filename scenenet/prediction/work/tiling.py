@@ -28,8 +28,18 @@ _BIAS = 1 << (_BITS - 1)
 _SPOOLED = np.dtype([("voxel", "<i4"), ("count", "<i4")])
 _OFFSET = np.dtype("<f4")
 
-SPOOLED_KINDS = ("voxels", "points")
+SPOOLED_KINDS = VOXELS, POINTS = ("voxels", "points")
 """Blocks of each tile: its occupied voxels, and its points."""
+
+
+def spooled_kinds(further: Iterable[float]) -> tuple[str, ...]:
+    """The kinds of blocks of a survey that is in voxels of ``further`` sizes (m) too."""
+    return (*SPOOLED_KINDS, *map(further_voxels, further))
+
+
+def further_voxels(voxel_size: float) -> str:
+    """The kind of the blocks with the occupied voxels of a further size, m."""
+    return f"{VOXELS} {voxel_size!r}"
 
 
 @dataclass(frozen=True)
@@ -103,9 +113,16 @@ class Lattice:
 class SpoolWriter:
     """Writes the occupied voxels and the points of a file of a survey, tile by tile."""
 
-    def __init__(self, blocks: BlockWriter, lattice: Lattice) -> None:
-        """Add points to ``blocks``, which has the kinds of ``SPOOLED_KINDS``."""
+    def __init__(
+        self, blocks: BlockWriter, lattice: Lattice, further: Iterable[float] = ()
+    ) -> None:
+        """Add points to ``blocks``, which has the kinds of ``spooled_kinds``.
+
+        Args:
+            further: further sizes of voxels, m, for models that observe other ones.
+        """
         self._blocks, self.lattice = blocks, lattice
+        self._further = {further_voxels(size): Lattice(size) for size in further}
 
     def add(self, xyz: np.ndarray) -> None:
         """Add points (n, 3) m to their tiles.
@@ -113,29 +130,50 @@ class SpoolWriter:
         Raises:
             InputError: a coordinate is outside the lattice.
         """
-        codes, voxels = self.lattice.locate(xyz)
+        for code, rows in self._add_voxels(VOXELS, self.lattice, xyz):
+            offset = xyz[rows] - self.lattice.corner(code)
+            self._blocks.add(POINTS, code, offset.astype(_OFFSET))
+        for kind, lattice in self._further.items():
+            for _ in self._add_voxels(kind, lattice, xyz):
+                pass
+
+    def _add_voxels(
+        self, kind: str, lattice: Lattice, xyz: np.ndarray
+    ) -> Iterator[tuple[int, np.ndarray]]:
+        """Add the voxels of points (n, 3) m; each tile, with its rows, once its voxels are added.
+
+        Raises:
+            InputError: a coordinate is outside the lattice.
+        """
+        codes, voxels = lattice.locate(xyz)
         for code, rows in groups(codes):
             voxel, count = np.unique(voxels[rows], return_counts=True)
             records = np.empty(len(voxel), _SPOOLED)
             records["voxel"], records["count"] = voxel, count
-            self._blocks.add("voxels", code, records)
-            offset = xyz[rows] - self.lattice.corner(code)
-            self._blocks.add("points", code, offset.astype(_OFFSET))
+            self._blocks.add(kind, code, records)
+            yield code, rows
 
 
 class TileSpool:
-    """The occupied voxels and the points of a survey, in one file of blocks or in several."""
+    """The occupied voxels and the points of a survey, in one file of blocks or in several.
 
-    def __init__(self, lattice: Lattice, files: Iterable[BlockFile]) -> None:
+    Attributes:
+        lattice: of the voxels.
+        kind: of their blocks.
+    """
+
+    def __init__(self, lattice: Lattice, files: Iterable[BlockFile], kind: str = VOXELS) -> None:
         """Look at the files.
 
         Args:
             files: written by ``SpoolWriter`` on the same lattice. Their order does not matter.
+            kind: of the blocks with the voxels (``further_voxels``). Only those of ``VOXELS`` come
+                with points.
         """
-        self.lattice = lattice
+        self.lattice, self.kind = lattice, kind
         self._files: dict[int, list[BlockFile]] = defaultdict(list)
         for file in files:
-            for code in file.codes("voxels"):
+            for code in file.codes(kind):
                 self._files[code].append(file)
 
     @property
@@ -157,14 +195,20 @@ class TileSpool:
 
     def tile(self, code: int) -> Tile:
         """The tile with ``code``; a tile without voxels if it holds no point."""
-        records = self._read("voxels", code, _SPOOLED)
+        records = self._read(self.kind, code, _SPOOLED)
         voxel, inverse = np.unique(records["voxel"], return_inverse=True)
         count = np.bincount(inverse, weights=records["count"])
         return Tile(_decode(code), voxel, count.astype(np.int32))
 
     def points(self, code: int) -> np.ndarray:
-        """(n, 3) m, points of the tile with ``code``, to a few micrometres, in a fixed order."""
-        offset = self._read("points", code, _OFFSET).reshape(-1, 3)
+        """(n, 3) m, points of the tile with ``code``, to a few micrometres, in a fixed order.
+
+        Raises:
+            ValueError: the spool is that of voxels of a further size.
+        """
+        if self.kind != VOXELS:
+            raise ValueError(f"there are no points in tiles of {self.voxel_size:g} m voxels")
+        offset = self._read(POINTS, code, _OFFSET).reshape(-1, 3)
         return offset[_by_height(offset)] + self.lattice.corner(code)
 
     def around(self, place: tuple[int, int, int], reach: tuple[int, int, int]) -> Tile:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
 from scenenet.prediction.work.survey_system import SurveySystem, in_metres
-from scenenet.prediction.work.tiling import SPOOLED_KINDS, Lattice, SpoolWriter
+from scenenet.prediction.work.tiling import Lattice, SpoolWriter, spooled_kinds
 
 if TYPE_CHECKING:
     import pyproj
@@ -120,6 +121,7 @@ def read_file(
     chunk_points: int,
     crs: pyproj.CRS | None = None,
     planned: PlannedFile | None = None,
+    further: Sequence[float] = (),
 ) -> SurveyFile:
     """Read a survey file into a work file. Memory is bounded by a chunk of points.
 
@@ -133,19 +135,20 @@ def read_file(
         chunk_points: points read at once.
         crs: system of a file that states none; None if it is not known.
         planned: what another process expects of the file; None if nothing was expected.
+        further: further sizes of voxels, m, for models that observe other ones.
 
     Raises:
         OutputError: the work file cannot be written.
     """
     with atomic(out) as partial, partial.open("wb") as stream:
-        blocks, lattice = BlockWriter(stream, SPOOLED_KINDS), Lattice(voxel_size)
+        blocks, lattice = BlockWriter(stream, spooled_kinds(further)), Lattice(voxel_size)
         file, system = SurveyFile(path, name), None
         try:
             if planned is not None:
                 planned.require_same(path)
             info = survey_of_lengths(path, crs)
             system = SurveySystem.of(info)
-            file = _read(path, info, SpoolWriter(blocks, lattice), chunk_points)
+            file = _read(path, info, SpoolWriter(blocks, lattice, further), chunk_points)
             file = replace(file, name=name)
             if planned is not None:
                 planned.require_inside(file, info)

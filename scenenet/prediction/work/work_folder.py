@@ -14,6 +14,7 @@ from typing import Any
 from scenenet.core.errors import InputError, OutputError, storage_errors
 from scenenet.core.files import digest, read_json, write_json
 from scenenet.core.unchanged import FileState
+from scenenet.pointcloud.targets import Target
 from scenenet.prediction.survey_files import SurveyFiles
 from scenenet.prediction.work.block_file import BlockFile
 
@@ -39,9 +40,13 @@ class WorkFolder:
             if path not in survey.refused
         }
 
-    def predicted(self, name: str) -> Path:
-        """The predictions of a file, by its name in the survey."""
-        return self._of(name, "predictions")
+    def predicted(self, name: str, target: Target) -> Path:
+        """The predictions of the model of a target for a file, by its name in the survey."""
+        return self._of(name, f"{target.name}.predictions")
+
+    def all_predicted(self, name: str) -> list[Path]:
+        """The predictions of all models for a file, by its name in the survey."""
+        return list(self.folder.glob(self._of(name, "*.predictions").name))
 
     @property
     def towers(self) -> Path:
@@ -149,8 +154,8 @@ def _keep_what_fits(work: WorkFolder, survey: SurveyFiles, made_by: Mapping[str,
         same = {name for name, state in states.items() if before["files"].get(name) == state}
         kept = {out for name, out in reads.items() if name in same and _is_whole(out)}
         if before["files"] == states:
-            names = map(work.predicted, states)
-            kept |= {out for out in names if _is_whole(out)} | {work.towers, work.written}
+            predicted = (out for name in states for out in work.all_predicted(name))
+            kept |= {out for out in predicted if _is_whole(out)} | {work.towers, work.written}
         else:
             print(
                 f"{survey.given}: files have changed since the earlier run was stopped; "

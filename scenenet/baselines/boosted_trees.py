@@ -134,7 +134,9 @@ def fit(
         InputError: the crops have no tower voxel, or no other one.
     """
     features = [voxel_features(sample) for sample in training]
-    return fit_features(features, [sample.tower for sample in training], settings, seed, provenance)
+    return fit_features(
+        features, [sample.labelled for sample in training], settings, seed, provenance
+    )
 
 
 def threshold_curve(model: BoostedTrees, samples: Sequence[VoxelSample]) -> ThresholdCurve:
@@ -173,7 +175,7 @@ def fit_and_tune(
             remedy="Add labelled crops, or tune on validation crops",
         )
     features = [voxel_features(sample) for sample in training]
-    towers = [sample.tower for sample in training]
+    towers = [sample.labelled for sample in training]
     curve = ThresholdCurve.empty()
     for out, sample in enumerate(training):
         others = [i for i in range(len(training)) if i != out]

@@ -81,7 +81,7 @@ def _grow(
     begin = time.perf_counter()
     features = [voxel_features(sample) for sample in track(training, "boosted trees: features")]
     common, models, seconds = time.perf_counter() - begin, [], []
-    towers = [sample.tower for sample in training]
+    towers = [sample.labelled for sample in training]
     for seed in track(seeds, "boosted trees: trainings"):
         begin = time.perf_counter()
         models.append(fit_features(features, towers, BoostedTreesSettings(), seed))

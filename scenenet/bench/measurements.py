@@ -184,7 +184,7 @@ def training_step(samples: list[VoxelSample]) -> dict[str, Any]:
     size = (9, 9, 9)
     model = SceneNet(kernel_size=size, generator=torch.Generator().manual_seed(0))
     optimiser = Optimiser("rmsprop", model.parameters())
-    n_tower = sum(len(s.tower_index()) for s in chosen)
+    n_tower = sum(len(s.labelled_index()) for s in chosen)
     weights = VoxelWeights.of_counts(n_tower, BATCH * 64**3, alpha=5.0, epsilon=0.1)
     occupancy, towers = batch(chosen, "presence")
     volume = occupancy.dense()

@@ -66,13 +66,17 @@ def score_lines(result: dict[str, Any]) -> list[str]:
 
 
 def _scores(result: dict[str, Any], model: str, kind: str, target: str) -> list[str]:
+    labels = [f"{column.label.replace(TOWER.name, target):>9}" for column in SCORE_COLUMNS]
+
     def row(name: str, scores: dict[str, float | None]) -> str:
         values = [scores[column.name] for column in SCORE_COLUMNS]
         cells = ["-" if value is None else f"{value:.3f}" for value in values]
-        return f"{name:<24}" + "".join(f"{cell:>10}" for cell in cells)
+        return f"{name:<24}" + "".join(
+            f"{cell:>{len(label) + 1}}" for cell, label in zip(cells, labels, strict=True)
+        )
 
     voxels = [
-        f"{'':<24}" + "".join(f"{column.label:>10}" for column in SCORE_COLUMNS),
+        f"{'':<24}" + "".join(f"{label:>{len(label) + 1}}" for label in labels),
         row(model, result["voxel"]),
         row("  occupied voxels only", result["voxel_occupied"]),
         row("predicting nothing", result["voxel_trivial"]),

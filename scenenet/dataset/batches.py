@@ -22,7 +22,7 @@ def batch(samples: Sequence[VoxelSample], measurement: Measurement) -> tuple[Occ
     indices = [_into_shape(s.index, s.grid.shape, shape) for s in samples]
     volume = int(np.prod(shape))
     towers = [
-        b * volume + i[s.tower] for b, (s, i) in enumerate(zip(samples, indices, strict=True))
+        b * volume + i[s.labelled] for b, (s, i) in enumerate(zip(samples, indices, strict=True))
     ]
     phi = None if measurement == "presence" else [s.phi(measurement) for s in samples]
     occupancy = Occupancy.of_grids(indices, phi, shape)

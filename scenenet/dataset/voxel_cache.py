@@ -68,7 +68,7 @@ def build(
                 sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id, target)
             seconds = time.perf_counter() - begin
             shape = measure_shape(crop, cloud) if shapes and target.is_tower else None
-            arrays = {"index": sample.index, "count": sample.count, "tower": sample.tower}
+            arrays = {"index": sample.index, "count": sample.count, "tower": sample.labelled}
             if sample.true is not None:
                 arrays["true"] = sample.true
             writer.add(crop.id, arrays)
@@ -79,7 +79,7 @@ def build(
                     "voxel_size": sample.grid.voxel_size,
                     "shape": list(sample.grid.shape),
                     "occupied": len(sample.index),
-                    "tower": int(sample.tower.sum()),
+                    "tower": int(sample.labelled.sum()),
                     "seconds": seconds,
                     "tower_shape": None if shape is None else shape.plain(),
                 }
@@ -131,7 +131,9 @@ def load(manifests: Sequence[str | Path], ids: set[str] | None = None) -> Datase
             grid = VoxelGrid(tuple(entry["origin"]), entry["voxel_size"], tuple(entry["shape"]))
             known = entry.get("tower_shape")
             shape = None if known is None else TowerShape(**known)
-            samples.append(VoxelSample(entry["id"], grid, **reader.get(entry["id"]), shape=shape))
+            arrays = reader.get(entry["id"])
+            arrays["labelled"] = arrays.pop("tower")  # its name in stores of every version
+            samples.append(VoxelSample(entry["id"], grid, **arrays, shape=shape))
             crops.append(crop_of(entry))
     if ids is not None and (missing := ids - {sample.id for sample in samples}):
         raise InputError(

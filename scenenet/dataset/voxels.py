@@ -158,9 +158,10 @@ class VoxelSample:
         grid: where the voxels lie.
         index: (M,) int32, flat C-order [z, y, x] positions of the occupied voxels, ascending.
         count: (M,) int32, number of points in each.
-        tower: (M,) bool, whether any of its points is labelled tower: what a model learns.
-        true: (M,) bool, whether any of its points is tower in truth; None where the truth is not
-            known.
+        labelled: (M,) bool, whether any of its points is labelled with the target: what a model
+            learns.
+        true: (M,) bool, whether any of its points is the target in truth; None where the truth is
+            not known.
         shape: of the tower in the middle, as the points of the crop show it; None where they do
             not.
     """
@@ -169,7 +170,7 @@ class VoxelSample:
     grid: VoxelGrid
     index: np.ndarray
     count: np.ndarray
-    tower: np.ndarray
+    labelled: np.ndarray
     true: np.ndarray | None = None
     shape: TowerShape | None = None
 
@@ -190,13 +191,14 @@ class VoxelSample:
         return probability, self.labels()
 
     def labels(self) -> np.ndarray:
-        """(V,) bool: the voxels of the grid that are labelled tower."""
+        """(V,) bool: the voxels of the grid that are labelled with the target."""
         labelled = np.zeros(self.grid.n_voxels, bool)
-        labelled[self.tower_index()] = True
+        labelled[self.labelled_index()] = True
         return labelled
 
     def truth(self) -> np.ndarray | None:
-        """(V,) bool: the voxels of the grid that are tower in truth; None where it is not known."""
+        """(V,) bool: the voxels of the grid that are the target in truth; None where it is not
+        known."""
         if self.true is None:
             return None
         true = np.zeros(self.grid.n_voxels, bool)
@@ -205,11 +207,11 @@ class VoxelSample:
 
     def labelled_by_truth(self) -> VoxelSample | None:
         """The same voxels with the truth as their labels; None where it is not known."""
-        return None if self.true is None else replace(self, tower=self.true)
+        return None if self.true is None else replace(self, labelled=self.true)
 
-    def tower_index(self) -> np.ndarray:
-        """(T,) flat positions of the tower voxels."""
-        return self.index[self.tower]
+    def labelled_index(self) -> np.ndarray:
+        """(T,) flat positions of the labelled voxels."""
+        return self.index[self.labelled]
 
 
 def voxelise(
@@ -224,12 +226,12 @@ def voxelise(
     from scenenet.dataset.voxel_counts import tally
 
     voxel = grid.voxel_of(cloud.xyz)
-    index, count, tower = tally(voxel, cloud.is_labelled(target), grid.n_voxels)
+    index, count, labelled = tally(voxel, cloud.is_labelled(target), grid.n_voxels)
     true = None
     if (is_true := cloud.is_truly(target)) is not None:
         true = np.zeros(len(index), bool)
         true[np.searchsorted(index, voxel[is_true])] = True
-    return VoxelSample(sample_id, grid, index, count, tower, true)
+    return VoxelSample(sample_id, grid, index, count, labelled, true)
 
 
 def median_voxel_size(samples: Iterable[VoxelSample]) -> float:

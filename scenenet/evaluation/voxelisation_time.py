@@ -48,7 +48,7 @@ def time_grids(crop_manifests: Sequence[str | Path], out: str | Path) -> pd.Data
                 begin = time.perf_counter()
                 sample = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution), crop.id)
                 seconds = time.perf_counter() - begin
-                counts = len(sample.index), int(sample.tower.sum())
+                counts = len(sample.index), int(sample.labelled.sum())
                 rows.append((f"cube-{resolution}", crop.id, seconds, *counts))
     table = pd.DataFrame(rows, columns=list(COLUMNS))
     with atomic(out) as partial:

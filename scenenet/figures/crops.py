@@ -93,7 +93,7 @@ def draw_resolutions(results: Results, model: str, out: Path) -> tuple[str, str]
         size = voxels.grid.voxel_size
         title = f"{resolution}³, voxels of {size:.2f} m"
         centres = voxels.grid.centres(voxels.index)
-        views.append(GridView(title, centres, size, voxels.tower, probability[voxels.index]))
+        views.append(GridView(title, centres, size, voxels.labelled, probability[voxels.index]))
         scores.append(
             f"precision {score_text(counts.precision)} and recall {score_text(counts.recall)} "
             f"at {resolution}³"

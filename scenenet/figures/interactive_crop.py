@@ -87,7 +87,7 @@ def write_interactive_crop(
         classes=CLASSES,
         zyx=np.stack(np.unravel_index(voxels.index, voxels.grid.shape), axis=1),
         voxel_class=np.array([CLASSES.index(name) for name in names], np.uint8),
-        tower=voxels.tower,
+        tower=voxels.labelled,
         shares=_shares(trained, voxels, card.measurement),
         steps=np.searchsorted(taus, probability[voxels.index], side="right"),
         taus=tuple(float(f"{tau:.6g}") for tau in THRESHOLDS),

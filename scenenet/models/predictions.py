@@ -105,7 +105,9 @@ def prepare_crops(
         observed, row = coarsened(occupancy, edge)
         size = edge * sample.grid.voxel_size
         section = model.at(size).section(observed) if model.linear else None
-        crops.append(PreparedCrop(observed, size, section, row, sample.tower, sample.grid.n_voxels))
+        crops.append(
+            PreparedCrop(observed, size, section, row, sample.labelled, sample.grid.n_voxels)
+        )
     return crops
 
 

@@ -87,7 +87,7 @@ def identity_of(
 
     def summary(sample: VoxelSample) -> list[Any]:
         shape = None if sample.shape is None else sample.shape.plain()
-        counts = len(sample.index), int(sample.index.sum()), int(sample.tower.sum())
+        counts = len(sample.index), int(sample.index.sum()), int(sample.labelled.sum())
         return [sample.id, *counts, shape]
 
     samples = [[summary(sample) for sample in part] for part in (training, validation)]

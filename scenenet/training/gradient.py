@@ -47,7 +47,7 @@ def fit_by_gradient(
     protocol = settings.training
     model = starting_model(settings, seed, training)
     optimiser = Optimiser(protocol.optimiser, model.parameters())
-    n_tower = sum(int(sample.tower.sum()) for sample in training)
+    n_tower = sum(int(sample.labelled.sum()) for sample in training)
     n_voxels = sum(sample.grid.n_voxels for sample in training)
     weights = VoxelWeights.of_counts(n_tower, n_voxels, protocol.loss.alpha, protocol.loss.epsilon)
     history = _resume(checkpoint, model, optimiser)

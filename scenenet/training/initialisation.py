@@ -123,7 +123,7 @@ def _best_level(kernel: Tensor, training: Sequence[VoxelSample], measurement: Me
     for sample in training:
         occupancy, _ = batch([sample], measurement)
         answers.append(convolve_at_voxels(occupancy, kernel.detach()[None])[0].numpy())
-        towers.append(sample.tower)
+        towers.append(sample.labelled)
     answer, tower = np.concatenate(answers), np.concatenate(towers)
     order = np.argsort(-answer, kind="stable")
     found = tower[order].cumsum()
@@ -142,11 +142,11 @@ def discriminant(
     rows = max(1, MOST_VOXELS // max(1, len(samples)))
     for sample in samples:
         # All tower voxels, and an even choice of the others within the limit.
-        others = np.flatnonzero(~sample.tower)
+        others = np.flatnonzero(~sample.labelled)
         others = others[:: -(-len(others) // rows)]
-        chosen = np.concatenate([np.flatnonzero(sample.tower), others])
+        chosen = np.concatenate([np.flatnonzero(sample.labelled), others])
         every.append(_patches(sample, chosen, measurement, size))
-        towers.append(sample.tower[chosen])
+        towers.append(sample.labelled[chosen])
     seen, tower = np.concatenate(every), np.concatenate(towers)
     within = np.where(tower[:, None], seen[tower].mean(axis=0), seen[~tower].mean(axis=0))
     spread = seen - within

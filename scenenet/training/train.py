@@ -116,7 +116,7 @@ def fit(
         InputError: there is no voxel labelled with the target to train on, or the training
             diverged (``scenenet.training.gradient.LostTraining``).
     """
-    if not any(sample.tower.any() for sample in training):
+    if not any(sample.labelled.any() for sample in training):
         raise InputError(
             f"no {settings.finds.name} voxel in the {len(training)} training crops",
             remedy="Add labelled crops, and check that their class scheme is the right one",

@@ -68,7 +68,7 @@ def test_empty_voxels_are_never_tower(trained, crops):
     empty = np.delete(probability, crops[3].index)
     assert not empty.any()
     np.testing.assert_array_equal(probability[crops[3].index], model.of_occupied(crops[3]))
-    assert set(np.flatnonzero(truth)) == set(crops[3].tower_index())
+    assert set(np.flatnonzero(truth)) == set(crops[3].labelled_index())
 
 
 def test_the_seed_determines_the_trees(crops):
@@ -113,10 +113,10 @@ def test_a_tower_weight_is_the_weight_of_all_towers_together(crops):
 
 
 def test_training_crops_without_a_tower_are_refused(crops):
-    bare = [replace(crop, tower=np.zeros(len(crop.index), bool)) for crop in crops]
+    bare = [replace(crop, labelled=np.zeros(len(crop.index), bool)) for crop in crops]
     with pytest.raises(InputError, match=r"the 4 training crops have no tower voxel"):
         fit(bare, FEW, 0)
-    full = [replace(crop, tower=np.ones(len(crop.index), bool)) for crop in crops]
+    full = [replace(crop, labelled=np.ones(len(crop.index), bool)) for crop in crops]
     with pytest.raises(InputError, match="have only tower voxels"):
         fit(full, FEW, 0)
     with pytest.raises(InputError, match="the 0 training crops have no tower voxel"):

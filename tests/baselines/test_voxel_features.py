@@ -130,7 +130,7 @@ def test_a_hole_in_the_ground_does_not_raise_its_neighbours():
 def test_features_do_not_depend_on_labels_or_position():
     sample = sample_of(flat_ground(), pole(), conductor())
     expected = voxel_features(sample)
-    labelled = replace(sample, tower=np.ones(len(sample.index), bool))
+    labelled = replace(sample, labelled=np.ones(len(sample.index), bool))
     np.testing.assert_array_equal(voxel_features(labelled), expected)
     moved = replace(sample, grid=replace(sample.grid, origin=(5e5, 4.6e6, 100.0)))
     np.testing.assert_array_equal(voxel_features(moved), expected)

@@ -64,8 +64,8 @@ def test_both_voxelisations_find_the_same_voxels(crops):
     counts, truth = peers.pandas_voxels(crops[0], grid)
     # A point on the border of two voxels may belong to either one, by rounding.
     assert abs(np.count_nonzero(counts) - len(sample.index)) <= 3
-    assert abs(np.count_nonzero(truth) - int(sample.tower.sum())) <= 1
-    assert set(np.flatnonzero(truth)) >= set(sample.tower_index()[:-1])
+    assert abs(np.count_nonzero(truth) - int(sample.labelled.sum())) <= 1
+    assert set(np.flatnonzero(truth)) >= set(sample.labelled_index()[:-1])
 
 
 def test_medians_use_the_requested_runs_and_slow_tasks_run_once():

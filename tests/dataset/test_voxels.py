@@ -117,8 +117,8 @@ def test_a_voxel_is_tower_if_any_of_its_points_is():
     sample = voxelise(cloud(points, codes), VoxelGrid((0.0, 0.0, 0.0), 1.0, (1, 1, 3)))
     assert sample.index.tolist() == [0, 1]
     assert sample.count.tolist() == [100, 1]
-    assert sample.tower.tolist() == [True, False]
-    assert sample.tower_index().tolist() == [0]
+    assert sample.labelled.tolist() == [True, False]
+    assert sample.labelled_index().tolist() == [0]
 
 
 def test_presence_is_one_and_density_relates_to_the_fullest_voxel():
@@ -143,7 +143,7 @@ def test_order_of_points_does_not_matter(xyz, voxel_size, random):
     grid = VoxelGrid.metric(xyz, voxel_size)
     one = voxelise(PointCloud(xyz, codes, EDP), grid)
     other = voxelise(PointCloud(xyz[order], codes[order], EDP), grid)
-    for name in ("index", "count", "tower"):
+    for name in ("index", "count", "labelled"):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
 
@@ -176,10 +176,10 @@ def test_the_cache_returns_what_was_voxelised(tmp_path, scene):
     for sample, made, entry in zip(dataset.samples, clouds, facts["samples"], strict=True):
         expected = voxelise(made, settings.grid(made.xyz), sample.id)
         assert sample.grid == expected.grid
-        for name in ("index", "count", "tower"):
+        for name in ("index", "count", "labelled"):
             np.testing.assert_array_equal(getattr(sample, name), getattr(expected, name))
         assert entry["occupied"] == len(expected.index)
-        assert entry["tower"] == expected.tower.sum() > 0
+        assert entry["tower"] == expected.labelled.sum() > 0
     assert [s.id for s in load([voxels], {"s-sample_1"}).samples] == ["s-sample_1"]
     assert StoreReader(voxels).manifest["grid"] == settings.model_dump()
 
@@ -212,7 +212,7 @@ def test_real_crops_have_the_voxels_of_the_published_code(real_samples, name):
     sample = real_samples[name]
     occupied, tower = PUBLISHED[name]
     assert abs(len(sample.index) - occupied) <= 3
-    assert abs(int(sample.tower.sum()) - tower) <= 3
+    assert abs(int(sample.labelled.sum()) - tower) <= 3
 
 
 def test_a_voxel_is_true_if_any_of_its_points_is_tower_in_truth(scene, tmp_path):
@@ -222,8 +222,8 @@ def test_a_voxel_is_true_if_any_of_its_points_is_tower_in_truth(scene, tmp_path)
     both = PointCloud(made.xyz, labels, EDP, truth=made.classification)
     grid = VoxelGrid.metric(made.xyz, 1.0)
     sample = voxelise(both, grid)
-    np.testing.assert_array_equal(sample.true, voxelise(made, grid).tower)
-    assert 0 < sample.true.sum() < sample.tower.sum()
+    np.testing.assert_array_equal(sample.true, voxelise(made, grid).labelled)
+    assert 0 < sample.true.sum() < sample.labelled.sum()
     np.testing.assert_array_equal(np.flatnonzero(sample.truth()), sample.index[sample.true])
     assert voxelise(made, grid).true is None and voxelise(made, grid).truth() is None
 

@@ -69,10 +69,10 @@ def test_rules_alone_find_poles_and_not_the_tree(crop):
 
 def test_without_rules_voxels_give_their_points_and_groups_are_towers(crop):
     def labels(sample):
-        return sample.spread(np.where(sample.tower, 0.6, 0.4).astype(np.float32))
+        return sample.spread(np.where(sample.labelled, 0.6, 0.4).astype(np.float32))
 
     answer = at_or_above_tau(crop.cloud, crop.sample, labels, 0.5)
-    assert np.array_equal(answer.voxels, crop.sample.tower_index())
+    assert np.array_equal(answer.voxels, crop.sample.labelled_index())
     assert answer.points.labels.recall == 1.0  # every labelled point is in such a voxel
     apart = np.hypot(*(answer.towers[:, None, :2] - crop.crop.towers[None, :, :2]).T)
     assert apart.shape == (2, 2) and (apart.min(axis=0) < 0.5).all()
@@ -90,6 +90,6 @@ def test_voxels_that_touch_at_a_corner_are_one_group():
 
 def test_a_voxel_with_a_point_of_the_answer_is_tower(crop):
     answer = Answer.of_points(crop.cloud, crop.sample.grid, crop.cloud.is_tower)
-    assert np.array_equal(answer.voxels, crop.sample.tower_index())
+    assert np.array_equal(answer.voxels, crop.sample.labelled_index())
     assert np.array_equal(answer.among(crop.sample.grid.n_voxels), crop.sample.labels())
     assert answer.towers is None and answer.match(crop.crop.towers) is None

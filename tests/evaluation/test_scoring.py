@@ -238,7 +238,7 @@ def with_truth(number: int, labelled: tuple[int, ...], true: tuple[int, ...]):
     standing, of_standing = crop(number, *true)
     np.testing.assert_array_equal(sample.index, standing.index)
     return (
-        replace(sample, true=standing.tower),
+        replace(sample, true=standing.labelled),
         replace(of_sample, true_towers=of_standing.towers),
     )
 

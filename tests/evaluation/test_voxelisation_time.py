@@ -31,4 +31,4 @@ def test_a_row_for_every_timed_crop_and_grid(tmp_path, monkeypatch, most):
         cloud = clouds[found.crop]
         grid = VoxelGrid.cube(cloud.xyz, int(found.grid.removeprefix("cube-")))
         sample = voxelise(cloud, grid, found.crop)
-        assert (found.occupied, found.tower) == (len(sample.index), sample.tower.sum())
+        assert (found.occupied, found.tower) == (len(sample.index), sample.labelled.sum())

@@ -86,5 +86,5 @@ def test_a_training_that_diverges_detects_nothing(crops):
     assert tuned_model.f05 == 0
     counts = tuned_model.score(crops)
     assert (counts.tp, counts.fp) == (0, 0)
-    assert counts.fn == sum(int(sample.tower.sum()) for sample in crops)
+    assert counts.fn == sum(int(sample.labelled.sum()) for sample in crops)
     assert tuned_model.parameters == 3 * 27 + 3

@@ -217,7 +217,7 @@ def test_files_of_a_stopped_prediction_are_its_own(uncut, model, tmp_path, monke
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("scenenet.prediction.writers.write_towers", stop)
+    monkeypatch.setattr("scenenet.prediction.writers.write_layers", stop)
     files = PredictionFiles.of(SurveyFiles.of(tiles), tmp_path / "out")
     with pytest.raises(KeyboardInterrupt):
         predict_to_files(tiles, model, files, PredictSettings(), LONE_POLES)

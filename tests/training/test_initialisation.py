@@ -43,7 +43,7 @@ def test_the_discriminant_separates_towers_better_than_a_mean_difference(toys):
         for sample in toys:
             occupancy, _ = batch([sample], "presence")
             answers.append(convolve_at_voxels(occupancy, direction[None])[0].numpy())
-            towers.append(sample.tower)
+            towers.append(sample.labelled)
         answer, tower = np.concatenate(answers), np.concatenate(towers)
         within = np.where(tower, answer[tower].mean(), answer[~tower].mean())
         apart = answer[tower].mean() - answer[~tower].mean()

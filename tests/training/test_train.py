@@ -141,7 +141,7 @@ def test_cross_entropy_falls_and_is_the_validation_loss(toys, kind):
     model, history = fit(toys[:3], toys[3:], chosen, seed=0)
     assert history["fidelity"].iloc[-1] < 0.9 * history["fidelity"].iloc[0]
     occupancy, towers = batch(toys[3:], "presence")
-    n_tower, n = sum(t.tower.sum() for t in toys[:3]), sum(t.grid.n_voxels for t in toys[:3])
+    n_tower, n = sum(t.labelled.sum() for t in toys[:3]), sum(t.grid.n_voxels for t in toys[:3])
     weights = VoxelWeights.of_counts(n_tower, n, alpha=5.0, epsilon=0.1)
     with torch.no_grad():
         recomputed = fidelity(model, occupancy, towers, weights, "cross_entropy").item()
@@ -211,7 +211,7 @@ def test_order_of_validation_samples_does_not_matter(toys, pole_finder):
     back = threshold_curve(model, toys[::-1], "presence")
     np.testing.assert_array_equal(forth.true, back.true)
     np.testing.assert_array_equal(forth.false, back.false)
-    assert forth.true.sum() == sum(s.tower.sum() for s in toys)
+    assert forth.true.sum() == sum(s.labelled.sum() for s in toys)
     assert forth.true.sum() + forth.false.sum() == sum(s.grid.n_voxels for s in toys)
 
 
@@ -227,10 +227,10 @@ def test_crops_of_different_sizes_are_predicted_alike_in_a_batch_and_alone(scene
         alone, truth = probabilities(model, sample, "presence")
         z, y, x = sample.grid.shape
         np.testing.assert_array_equal(volume[:z, :y, :x].ravel(), alone)
-        assert truth.sum() == sample.tower.sum()
+        assert truth.sum() == sample.labelled.sum()
     flat = together.reshape(-1)
-    assert len(towers) == sum(s.tower.sum() for s in samples)
-    expected = [probabilities(model, s, "presence")[0][s.tower_index()] for s in samples]
+    assert len(towers) == sum(s.labelled.sum() for s in samples)
+    expected = [probabilities(model, s, "presence")[0][s.labelled_index()] for s in samples]
     np.testing.assert_array_equal(flat[towers], np.concatenate(expected))
 
 

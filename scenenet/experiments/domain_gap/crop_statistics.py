@@ -192,7 +192,7 @@ def _voxels(cloud: PointCloud) -> dict[str, float]:
     for resolution in RESOLUTIONS:
         sample = voxelise(cloud, VoxelGrid.cube(cloud.xyz, resolution))
         found[f"occupied_{resolution}"] = 100 * len(sample.index) / sample.grid.n_voxels
-        found[f"tower_voxels_{resolution}"] = float(sample.tower.sum())
+        found[f"tower_voxels_{resolution}"] = float(sample.labelled.sum())
     return found
 
 

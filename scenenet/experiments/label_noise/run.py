@@ -155,4 +155,4 @@ def _tallied(
 
 def _towers(sample: VoxelSample) -> np.ndarray:
     """(V,) bool: voxels of a sample that are labelled tower."""
-    return sample.spread(sample.tower)[1]
+    return sample.spread(sample.labelled)[1]

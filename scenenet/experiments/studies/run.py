@@ -168,7 +168,7 @@ def _applied(model: VoxelModel, plan: Plan) -> VoxelModel:
 
 
 def _nothing_found(scored: Sequence[VoxelSample]) -> dict[str, Any]:
-    n_tower = sum(int(sample.tower.sum()) for sample in scored)
+    n_tower = sum(int(sample.labelled.sum()) for sample in scored)
     n_voxels = sum(sample.grid.n_voxels for sample in scored)
     unknown = dict.fromkeys(("tau", "inference_ms"), math.nan)
     zero = {"average_precision": 0.0, "validation_f05": 0.0, "alive": False}

@@ -111,7 +111,7 @@ def test_answers_that_need_no_training(fixed):
 def test_counts_are_of_all_test_crops(folder, fixed):
     (part,) = parts_of(folder)
     true = sum(int(crop.cloud.is_true_tower.sum()) for crop in part.tested)
-    labelled = sum(int(crop.sample.tower.sum()) for crop in part.tested)
+    labelled = sum(int(crop.sample.labelled.sum()) for crop in part.tested)
     assert (fixed["truth_point_tp"] + fixed["truth_point_fn"] == true).all()
     of_models = fixed[fixed["model"] != LABELS]
     assert (of_models["voxel_tp"] + of_models["voxel_fn"] == labelled).all()

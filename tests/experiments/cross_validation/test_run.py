@@ -75,14 +75,14 @@ def test_a_row_for_every_seed_and_fold(manifest, models, tmp_path):
     row = table[(table["seed"] == 1) & (table["fold"] == 2)].iloc[0]
     counts = tuned.score(out)
     assert (row["tau"], row["f05"], row["tp"]) == (tuned.tau, counts.f05, counts.tp)
-    assert row["tp"] + row["fn"] == sum(int(sample.tower.sum()) for sample in out)
+    assert row["tp"] + row["fn"] == sum(int(sample.labelled.sum()) for sample in out)
     row = whole[(whole["seed"] == 1) & (whole["fold"] == 2)].iloc[0]
     clouds = CropClouds([manifest.with_name("crops.json")])
     rules = rules_on(clouds, tuned.predict, tuned.tau, tuned.voxel_size, DETECTION)
     answers = {sample.id: rules(sample) for sample in out}
     counts = tuned.score_towers(out, answers)
     assert (row["tau"], row["f05"], row["tp"]) == (tuned.tau, counts.f05, counts.tp)
-    against_truth = [replace(sample, tower=sample.true) for sample in out]
+    against_truth = [replace(sample, labelled=sample.true) for sample in out]
     counts = tuned.score_towers(against_truth, answers)
     assert (row["truth_f05"], row["truth_tp"]) == (counts.f05, counts.tp)
     row = table[(table["seed"] == 1) & (table["fold"] == 2)].iloc[0]

@@ -48,12 +48,12 @@ def test_voxels_are_the_same_and_labels_are_not(line):
         assert labelled.id == wrong.id == true.id
         np.testing.assert_array_equal(wrong.index, true.index)
         np.testing.assert_array_equal(wrong.count, true.count)
-        np.testing.assert_array_equal(labelled.tower, true.tower)
-        assert (wrong.tower & ~true.tower).any()
-        assert not (true.tower & ~wrong.tower).any()  # annotators overlook nothing
+        np.testing.assert_array_equal(labelled.labelled, true.labelled)
+        assert (wrong.labelled & ~true.labelled).any()
+        assert not (true.labelled & ~wrong.labelled).any()  # annotators overlook nothing
         near = np.hypot(cloud.xyz[:, 0] - tower.x, cloud.xyz[:, 1] - tower.y) <= tower.height
         assert true.count.sum() == near.sum()
-        assert true.tower.any()
+        assert true.labelled.any()
 
 
 def test_an_unreachable_share_of_wrong_labels_is_refused(line):

@@ -60,8 +60,8 @@ def test_labels_are_scored_as_if_a_model_had_predicted_them(made, line):
     table, _ = made
     row = table[(table["model"] == LABELS) & (table["level"] == 0.5)].iloc[0]
     _, noisy = noisy_lines(line, (0, 0.5), GRID)
-    labelled = sum(int(s.tower.sum()) for s in noisy.labelled[6:])
-    true = sum(int(s.tower.sum()) for s in noisy.true[6:])
+    labelled = sum(int(s.labelled.sum()) for s in noisy.labelled[6:])
+    true = sum(int(s.labelled.sum()) for s in noisy.true[6:])
     assert row["truth_precision"] == pytest.approx(true / labelled)
     assert row["truth_recall"] == row["labels_f05"] == row["wrong_detected"] == 1
     assert row["share"] == noisy.share

@@ -14,8 +14,8 @@ from scenenet.core.provenance import fingerprint
 from scenenet.pointcloud.copc import write_copc
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.point_writer import write_points
-from scenenet.prediction.predict import SurveyPrediction
 from scenenet.prediction.result_files import PredictionFiles, copc_of
+from scenenet.prediction.survey_prediction import SurveyPrediction
 from scenenet.prediction.work.work_folder import WorkFolder
 
 

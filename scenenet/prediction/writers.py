@@ -17,11 +17,12 @@ from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.copc import write_copc
 from scenenet.prediction.file_status import write_status
 from scenenet.prediction.page.survey_page import write_page
-from scenenet.prediction.predict import SurveyPrediction, predict_survey
+from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.result_files import PredictionFiles, copc_of
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
 from scenenet.prediction.survey_files import SurveyFiles
+from scenenet.prediction.survey_prediction import SurveyPrediction
 from scenenet.prediction.tile_results import write_file, write_tiles
 from scenenet.prediction.tower_lists import write_csv, write_geojson, write_geopackage
 from scenenet.prediction.used_models import ModelPaths, paths_of, use_models

@@ -23,9 +23,10 @@ from scenenet.models.model_file import ModelCard
 from scenenet.pointcloud import iter_chunks
 from scenenet.pointcloud.units import METRE, SYMBOLS
 from scenenet.prediction.file_status import readable
-from scenenet.prediction.predict import SCRATCH_BYTES, SurveyPrediction, predict_survey
+from scenenet.prediction.predict import SCRATCH_BYTES, predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
+from scenenet.prediction.survey_prediction import SurveyPrediction
 from scenenet.prediction.used_models import use_models
 from scenenet.prediction.work.survey_system import in_metres
 from scenenet.report.blocks import Block, Column, Facts, Figure, Notes, Section, Text, table, write

@@ -12,11 +12,11 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.found_towers import FoundTowers
 from scenenet.prediction.jobs.joined import joined_predictions, joined_work
-from scenenet.prediction.predict import SurveyPrediction
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.summary import PredictionSummary
 from scenenet.prediction.survey_files import SurveyFiles
+from scenenet.prediction.survey_prediction import SurveyPrediction
 from scenenet.prediction.writers import write_all_lists
 
 

@@ -14,7 +14,7 @@ from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.tower_lists import coverage
 
 if TYPE_CHECKING:
-    from scenenet.prediction.predict import SurveyPrediction
+    from scenenet.prediction.survey_prediction import SurveyPrediction
 
 MOST_CORNERS = 20_000
 """Most corners of the outline of the coverage; a longer survey has a simpler outline."""

@@ -14,7 +14,7 @@ from scenenet.detection.survey_tower import SurveyTower
 from scenenet.prediction.surroundings import survey_points
 
 if TYPE_CHECKING:
-    from scenenet.prediction.predict import SurveyPrediction
+    from scenenet.prediction.survey_prediction import SurveyPrediction
 
 STEP_M = 0.01
 """m, step of the coordinates in a picture. A pixel is wider."""

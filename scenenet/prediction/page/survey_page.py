@@ -21,7 +21,7 @@ from scenenet.prediction.page.map_shapes import MapFrame, frame_and_shapes
 from scenenet.prediction.page.pictures import STEP_M, TowerPicture, radius_of, tower_pictures
 
 if TYPE_CHECKING:
-    from scenenet.prediction.predict import SurveyPrediction
+    from scenenet.prediction.survey_prediction import SurveyPrediction
 
 ASSETS = Path(__file__).parent / "assets"
 

@@ -132,6 +132,12 @@ class MetricSettings(Settings):
 class SearchSettings(Settings):
     """The search for the parameters of a SCENE-Net in metres."""
 
+    result: Literal["best", "middle"] = Field(
+        "best",
+        description="best: the numbers with the highest score; middle: the mean of all random "
+        "initial points whose score is hardly lower than the highest, for numbers that few crops "
+        "do not determine. There are no generations then",
+    )
     searches: int = Field(4, ge=1, description="searches started; only the best continues")
     trial: int = Field(15, ge=0, description="generations after which the best search is chosen")
     starts: int = Field(
@@ -140,6 +146,14 @@ class SearchSettings(Settings):
     population: int = Field(14, ge=4, description="candidates per generation")
     generations: int = Field(60, ge=1, description="generations of a search, trial included")
     step: float = Field(0.7, gt=0, description="initial step size, in units of the logit")
+
+    @model_serializer(mode="wrap")
+    def _without_new(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """As for ``MetricSettings``."""
+        raw: dict[str, Any] = dump(self)
+        if self.result == "best":
+            raw.pop("result", None)
+        return raw
 
 
 class LossSettings(Settings):

@@ -23,6 +23,10 @@ from scenenet.training.evolution import Score, State, advance, begin, settled
 from scenenet.training.measured_numbers import FreeNumbers, measure
 from scenenet.training.objective import draws, scorer
 
+HARDLY_LESS = 0.02
+"""Loss of score that is within the chance of having these crops and not others: scores on six crops
+differ by more."""
+
 
 def fit_by_search(
     training: Sequence[VoxelSample],
@@ -37,7 +41,8 @@ def fit_by_search(
     generation of the search: loss is 1 - F0.5 of the best numbers so far on the training crops, as
     the search weighs it, followed by the parameters. Several searches start, and the best of them
     continues; the rows are those of that one, and ``search`` is its number. Numbers that are
-    measured or fixed are not searched for (``scenenet.training.measured_numbers``).
+    measured or fixed are not searched for (``scenenet.training.measured_numbers``). With
+    ``search.result`` ``middle`` there is one row, of the mean of many draws.
     """
     model = new_model(settings, seed)
     assert isinstance(model, MetricSceneNet)
@@ -48,11 +53,31 @@ def fit_by_search(
     learnt = prepare_crops(model, training, settings.measurement)
     kept = prepare_crops(model, validation, settings.measurement)
     score = scorer(free, learnt)
+    if settings.search.result == "middle":
+        history = [_middle(free, score, settings, seed, kept)]
+    else:
+        history = _generations(free, score, settings, seed, kept, checkpoint)
+    known = KnownAnswers()
+    model.evidence = evidence(
+        model, measured, lambda: model.best_step(curve_of(model, learnt, known))[1]
+    )
+    return model, pd.DataFrame(history)
+
+
+def _generations(
+    free: FreeNumbers,
+    score: Score,
+    settings: ModelSettings,
+    seed: int,
+    kept: Sequence[PreparedCrop],
+    checkpoint: checkpoints.Checkpoint,
+) -> list[dict[str, Any]]:
+    """Search generation by generation, and set the best numbers; the rows of the history."""
     search = settings.search
 
     def row(state: State, seconds: float) -> dict[str, float]:
         free.set(state.best)
-        return _row(model, state, kept, seconds)
+        return _row(free.model, state.generation, state.best_score, kept, seconds)
 
     state, history = _resume(checkpoint)
     if state is None:
@@ -72,11 +97,35 @@ def fit_by_search(
         history.append(row(state, time.perf_counter() - started) | {"search": chosen})
         _save(checkpoint, state, history)
     free.set(state.best)
-    known = KnownAnswers()
-    model.evidence = evidence(
-        model, measured, lambda: model.best_step(curve_of(model, learnt, known))[1]
+    return history
+
+
+def _middle(
+    free: FreeNumbers,
+    score: Score,
+    settings: ModelSettings,
+    seed: int,
+    kept: Sequence[PreparedCrop],
+) -> dict[str, Any]:
+    """Set the mean of all draws that score hardly less than the best one; the row of the history.
+
+    Where the score is the same over a wide range, the best draw lies anywhere in it, and the middle
+    is furthest from the numbers that do not fit.
+    """
+    started, model = time.perf_counter(), free.model
+    drawn = free.of(draws(model, settings.search.starts, np.random.default_rng([seed, 0])))
+    label = f"{settings.name} seed {seed}: draws"
+    scores = np.array([score(one) for one in track(list(drawn), label)])
+    good = []
+    for one in drawn[scores >= scores.max() - HARDLY_LESS]:
+        free.set(one)
+        good.append(model.shape_parameters())
+    # Means of weights that sum to one sum to one, and means of bounded lengths stay in bounds.
+    model.set_shape_parameters(
+        {name: float(np.mean([numbers[name] for numbers in good])) for name in good[0]}
     )
-    return model, pd.DataFrame(history)
+    reached = score(free.of(model.numbers()))
+    return _row(model, 1, reached, kept, time.perf_counter() - started)
 
 
 def _trial(
@@ -95,10 +144,14 @@ def _trial(
 
 
 def _row(
-    model: MetricSceneNet, state: State, kept: Sequence[PreparedCrop], seconds: float
+    model: MetricSceneNet,
+    generation: int,
+    reached: float,
+    kept: Sequence[PreparedCrop],
+    seconds: float,
 ) -> dict[str, float]:
-    loss = 1 - state.best_score
-    row = {"epoch": state.generation, "loss": loss, "fidelity": loss, "penalty": 0.0}
+    loss = 1 - reached
+    row = {"epoch": generation, "loss": loss, "fidelity": loss, "penalty": 0.0}
     row["seconds"] = seconds
     row |= {"validation_loss": float("nan"), "validation_f05": float("nan")}
     if kept:

@@ -175,7 +175,7 @@ def test_a_model_is_certified(call, pole_model):
     assert {"property", "thesis", "holds", "text", "value"} <= found["statements"][0].keys()
 
 
-def test_a_model_with_a_direction_is_not_certified_as_if_it_were_one_kernel(call, tmp_path):
+def test_a_model_with_a_direction_is_certified_by_what_holds_for_it(call, tmp_path):
     from fixtures.scenes import model_card
 
     from scenenet.models.metric_scenenet import MetricSceneNet
@@ -184,5 +184,5 @@ def test_a_model_with_a_direction_is_not_certified_as_if_it_were_one_kernel(call
     path = tmp_path / "wires.json"
     write_model(path, MetricSceneNet(["line"]), model_card())
     shown = call("geneo", "certify", "--model", path)
-    assert shown.code == 1
-    assert f"{path}: there is no certificate for this model" in shown.err
+    assert shown.code == 0
+    assert "line: its 32 turns are permuted by a turn of the scene" in shown.out

@@ -35,8 +35,8 @@ class Canopy(GeneoKernel):
             "radius of the ball in which points oppose a thin object",
             metric=(1.0, 4.0),
             sentence=_ball,
-            # The air that conductors of high voltage have around them.
-            fixed=3.0,
+            # The air around a conductor, and less than the distance between two circuits.
+            fixed=2.0,
         ),
     )
 

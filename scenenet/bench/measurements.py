@@ -15,6 +15,7 @@ from pydantic import Field
 
 from scenenet.bench import peers
 from scenenet.bench.crops import crops_in, synthetic_crops
+from scenenet.bench.orbits import orbits
 from scenenet.bench.timing import medians
 from scenenet.convolution.convolve import convolution_gradient, convolve
 from scenenet.convolution.occupancy import Occupancy
@@ -49,8 +50,8 @@ def bench(settings: BenchSettings) -> dict[str, Any]:
     """Run the benchmark.
 
     Returns:
-        convolution, gradient, training_step, voxelisation, survey, crops and machine (``quick``:
-        convolution, crops and machine), and thesis_training if ``settings.thesis``; plain numbers,
+        convolution, gradient, training_step, voxelisation, orbits, survey, crops and machine
+        (``quick``: convolution, crops and machine), and thesis_training if ``settings.thesis``; plain numbers,
         times in ms.
 
     Raises:
@@ -76,6 +77,7 @@ def bench(settings: BenchSettings) -> dict[str, Any]:
             "gradient": lambda: gradient(grids),
             "training_step": lambda: training_step(grids[64]),
             "voxelisation": lambda: voxelisation(crops),
+            "orbits": lambda: orbits(crops),
             "survey": survey,
         }
     if settings.thesis:

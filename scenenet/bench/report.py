@@ -92,6 +92,15 @@ def _work(result: dict[str, Any]) -> list[str]:
                 f"{entry['speedup']:.0f}",
             ]
         )
+    for name, entry in result["orbits"].items():
+        rows.append(
+            [
+                f"{entry['kernels']} directions of {name} at the voxels of a crop",
+                f"{entry['ours_ms']:.0f} ms",
+                f"one after the other {entry['each_ms']:.0f} ms, one {entry['one_ms']:.0f} ms",
+                f"{entry['each_ms'] / entry['ours_ms']:.0f}",
+            ]
+        )
     rows.append(
         [
             f"survey, {survey['points']:,} points, file to file",

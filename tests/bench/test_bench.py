@@ -12,6 +12,7 @@ import torch
 from scenenet.bench import BenchSettings, peers, tables
 from scenenet.bench import measurements as sections
 from scenenet.bench.crops import crops_in, synthetic_crops
+from scenenet.bench.orbits import orbits
 from scenenet.bench.timing import medians
 from scenenet.convolution.convolve import convolve
 from scenenet.core.errors import InputError
@@ -115,3 +116,11 @@ def test_a_folder_without_samples_is_named(tmp_path):
         sections.bench(BenchSettings(crops=tmp_path))
     with pytest.raises(InputError, match="not a folder"):
         crops_in(tmp_path / "none", "edp")
+
+
+def test_an_orbit_gives_the_maximum_of_its_kernels(crops):
+    found = orbits(crops[:1], repetitions=1)
+    assert found.keys() == {"line", "ground"}
+    assert found["line"]["kernels"] == 224
+    assert all(entry["difference"] < 1e-4 for entry in found.values())
+    assert all(entry["each_ms"] > entry["one_ms"] > 0 for entry in found.values())

@@ -51,8 +51,8 @@ def bench(settings: BenchSettings) -> dict[str, Any]:
 
     Returns:
         convolution, gradient, training_step, voxelisation, orbits, survey, crops and machine
-        (``quick``: convolution, crops and machine), and thesis_training if ``settings.thesis``; plain numbers,
-        times in ms.
+        (``quick``: convolution, crops and machine), and thesis_training if ``settings.thesis``;
+        plain numbers, times in ms.
 
     Raises:
         InputError: a crop cannot be read.

@@ -15,8 +15,9 @@ from fixtures.output_reference import Described, described, description_of
 
 pytestmark = pytest.mark.workflow
 
-ONLY_ELSEWHERE = {"sample", "samples", "search", "metric", "evidence"}
-"""Names of results that this run does not have: those of TS40K folders and of models in metres."""
+ONLY_ELSEWHERE = {"sample", "samples", "search", "metric", "evidence", "target", "first"}
+"""Names of results that this run does not have: those of TS40K folders, of models in metres and of
+other targets."""
 FREE_KEYS = ("mlflow/NAME.json", "config.yaml")
 """Files whose keys are names that the user chose."""
 

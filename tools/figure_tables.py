@@ -179,6 +179,7 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
         "figures of synthetic lines": of_files("lines", "seed of the line", TRUTH),
         "figures of recordings": of_files("recordings", "recording", ""),
+        "figures of observers of conductors": printed("observers", "observers.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }
 

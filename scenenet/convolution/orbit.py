@@ -3,7 +3,8 @@
 A kernel with a direction is a few hundred kernels, and most of them are zero at most positions: a
 line passes through 2 % of its box. The orbit is therefore stored by position: for each position the
 kernels that are not zero there, with their values. An occupied voxel in reach of an output adds to
-those kernels only, so the cost is that of the occupied part of one full kernel.
+those kernels only. Most of the time is spent near the centre, where all kernels of an orbit meet
+(docs/method/performance.md has the times).
 """
 
 from __future__ import annotations
@@ -47,10 +48,6 @@ class Orbit(NamedTuple):
         starts = np.searchsorted(position, np.arange(kz * ky * kx + 1))
         value = by_position[position, which]
         return cls(n, (kz, ky, kx), starts.astype(np.int64), which.astype(np.int32), value)
-
-    def scaled(self, factor: float) -> Orbit:
-        """The orbit of the kernels times a positive ``factor``."""
-        return self._replace(value=self.value * self.value.dtype.type(factor))
 
 
 def strongest_at_voxels(

@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from scenenet.interpretability.composed_properties import certify_composed
+from scenenet.interpretability.composed_properties import ComposedCertificate, certify_composed
 from scenenet.interpretability.equivariance import Scene, sample_scene
-from scenenet.interpretability.geneo_properties import ANGLES_DEG, certify
+from scenenet.interpretability.geneo_properties import ANGLES_DEG, Certificate, certify
 from scenenet.interpretability.result import ModelCertificate, Statement
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import ModelCard, read_model
@@ -55,6 +55,24 @@ def certificate(model: str | Path) -> ModelCertificate:
         for statement, value in zip(found.statements(), values, strict=False)
         if found.kernels or _of_convolution(statement)
     )
+    return _written(found, card, size, statements)
+
+
+def _composed(model: GeneoModel, card: ModelCard, size: float) -> ModelCertificate:
+    """The certificate of a model that is not one kernel."""
+    scene = Scene.of(sample_scene(), size, card.measurement)
+    found = certify_composed(model.at(size), scene, ANGLES_DEG, card.tau, seed=0)
+    return _written(found, card, size, tuple(found.statements()))
+
+
+def _written(
+    found: Certificate | ComposedCertificate,
+    card: ModelCard,
+    size: float,
+    statements: tuple[Statement, ...],
+) -> ModelCertificate:
+    """The content of the file: ``statements``, and what ``found`` measured at voxels of ``size``
+    m."""
     numbers = asdict(found)
     for name in ("kind", "half_voxel", "turns"):
         del numbers[name]
@@ -67,26 +85,6 @@ def certificate(model: str | Path) -> ModelCertificate:
         half_voxel=found.half_voxel,
         turns=found.turns,
         statements=statements,
-        numbers=numbers,
-    )
-
-
-def _composed(model: GeneoModel, card: ModelCard, size: float) -> ModelCertificate:
-    """The certificate of a model that is not one kernel."""
-    scene = Scene.of(sample_scene(), size, card.measurement)
-    found = certify_composed(model.at(size), scene, ANGLES_DEG, card.tau, seed=0)
-    numbers = asdict(found)
-    for name in ("kind", "half_voxel", "turns"):
-        del numbers[name]
-    return ModelCertificate(
-        model=card.name,
-        seed=card.provenance.get("seed"),
-        kind=found.kind,
-        voxel_size=size,
-        scene=SCENE,
-        half_voxel=found.half_voxel,
-        turns=found.turns,
-        statements=tuple(found.statements()),
         numbers=numbers,
     )
 

@@ -219,7 +219,7 @@ class MetricSceneNet(GeneoModel):
         extents = self._extents(self._shapes()).values()
         high = whole_voxels(max(max(e.up, e.down) for e in extents), voxel_size)
         wide = 2 * whole_voxels(max(e.around for e in extents), voxel_size) + 1
-        # Centred on the voxel it responds at, so twice the longer side high; ``_orbit`` sets the
+        # Centred on the voxel it responds at, so twice the longer side high; ``_sample`` sets the
         # excess of the shorter side to zero.
         size = (2 * high + 1, wide, wide)
         if max(size) > LARGEST_KERNEL:
@@ -281,29 +281,21 @@ class MetricSceneNet(GeneoModel):
 
         def parts(occupancy: Occupancy) -> Tensor:
             if measure is None:
-                return self._in_sections(answer(occupancy), occupancy)
+                return _strongest_parts(answer(occupancy), self.section(occupancy))
             phi = torch.relu(torch.tanh(measure(occupancy).sum(dim=0)))
             found = torch.zeros((len(self.names), len(occupancy.index)), dtype=phi.dtype)
             measured = occupancy.measured(phi.numpy())
-            found[:, phi > 0] = self._in_sections(answer(measured), measured)
+            found[:, phi > 0] = _strongest_parts(answer(measured), self.section(measured))
             return found
 
         return parts
 
-    def _in_sections(self, parts: Tensor, occupancy: Occupancy) -> Tensor:
-        """The parts (K, M) of the voxel in each cross-section that responds most."""
-        section = self.section(occupancy)
-        rows = strongest(parts.sum(dim=0).numpy(), section.starts, section.rows)
-        return parts[:, torch.from_numpy(rows)]
-
     def responses(self, occupancy: Occupancy, kernels: Tensor) -> Tensor:
         section = self.section(occupancy)
-        parts = convolve_at_voxels(occupancy, kernels, section.at)
-        rows = strongest(parts.sum(dim=0).numpy(), section.starts, section.rows)
-        return parts[:, torch.from_numpy(rows)]
+        return _strongest_parts(convolve_at_voxels(occupancy, kernels, section.at), section)
 
     def forward(self, occupancy: Occupancy) -> Tensor:
-        """Probability that each voxel is part of a tower, (B, D, H, W) in [0, 1].
+        """Probability that each voxel belongs to the target, (B, D, H, W) in [0, 1].
 
         It is 0 in empty voxels, and there is no gradient.
         """
@@ -422,6 +414,13 @@ class MetricSceneNet(GeneoModel):
             "the kernels of this SCENE-Net are in metres; their voxels follow from the grid",
             remedy="Use a model of protocol thesis for other kernel sizes",
         )
+
+
+def _strongest_parts(parts: Tensor, section: Section) -> Tensor:
+    """The parts (K, M) of the voxel that responds most in each cross-section, from those (K, C) at
+    the voxels of ``section.at``."""
+    rows = strongest(parts.sum(dim=0).numpy(), section.starts, section.rows)
+    return parts[:, torch.from_numpy(rows)]
 
 
 def _logit(share: float) -> float:

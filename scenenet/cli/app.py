@@ -20,6 +20,7 @@ from scenenet.cli.commands import (
     explain,
     geneo,
     predict,
+    register,
     synth,
     train,
 )
@@ -33,6 +34,7 @@ COMMANDS = {
     "predict": predict,
     "evaluate": evaluate,
     "explain": explain,
+    "register": register,
     "bench": bench,
 }
 

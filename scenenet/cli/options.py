@@ -123,6 +123,13 @@ System = Annotated[
         "or a file with WKT (.prj). A file that states another one is an error.",
     ),
 ]
+FoundTowers = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FOUND",
+        help="Tower list that scenenet predict wrote (NAME.towers.csv, NAME.gpkg), or its folder.",
+    ),
+]
 RESOLUTION = 64
 """Voxels along each edge of a crop where none are given (thesis 5.2.1)."""
 Resolution = Annotated[

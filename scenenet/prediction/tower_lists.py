@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -31,17 +31,39 @@ COVERAGE_CELL = 8
 """Voxels along the edge of the cells that make up the coverage."""
 
 
-def write_csv(path: str | Path, towers: Iterable[SurveyTower], geneos: Sequence[str]) -> None:
-    """Write the tower list as CSV, with x and y in the coordinates of the survey."""
+class ListedTower(Protocol):
+    """A tower as a list has it: one that was found, or one that people added."""
+
+    @property
+    def x(self) -> float:
+        """In the CRS and the units of the survey."""
+
+    @property
+    def y(self) -> float:
+        """As ``x``."""
+
+    @property
+    def base(self) -> float | None:
+        """Elevation of its foot, in the unit of the heights; None if it is not known."""
+
+    def to_row(self) -> dict[str, Any]:
+        """Its values by column, as a table holds them; None for what is not known."""
+
+    def to_feature(self, coordinates: Sequence[float]) -> dict[str, Any]:
+        """The tower as a GeoJSON feature at ``coordinates``."""
+
+
+def write_csv(path: str | Path, towers: Iterable[ListedTower], columns: Iterable[str]) -> None:
+    """Write towers as CSV, with x and y in the coordinates of the survey."""
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
-        table = csv.DictWriter(stream, list(row_types(geneos)), lineterminator="\n")
+        table = csv.DictWriter(stream, list(columns), lineterminator="\n")
         table.writeheader()
         table.writerows(tower.to_row() for tower in towers)
 
 
 def write_geojson(
     path: str | Path,
-    towers: Sequence[SurveyTower],
+    towers: Sequence[ListedTower],
     crs: pyproj.CRS | None,
     unit_sizes: tuple[float, float, float],
 ) -> None:
@@ -65,9 +87,10 @@ def write_geojson(
 
         to_degrees = Transformer.from_crs(crs.to_2d(), LONGITUDE_LATITUDE, always_xy=True)
         places = np.column_stack(to_degrees.transform(*places.T))
+    elevations = ([] if t.base is None else [t.base * vertical] for t in towers)
     collection["features"] = [
-        tower.to_feature([*map(float, place), tower.base * vertical])
-        for tower, place in zip(towers, places, strict=True)
+        tower.to_feature([*map(float, place), *elevation])
+        for tower, place, elevation in zip(towers, places, elevations, strict=True)
     ]
     write_json(path, collection)
 
@@ -106,18 +129,11 @@ def write_geopackage(
     facts = [file.to_json(targets) for file in files]
     attributes = {name: np.array([row[name] for row in facts]) for name in facts[0]}
     if towers is not None:
-        rows = [tower.to_row() for tower in towers]
-        # The types make the columns of an empty list the same as those of a full one.
-        fields: dict[str, np.ndarray] = {
-            name: np.array([row[name] for row in rows], dtype=object if kind is str else kind)
-            for name, kind in row_types(geneos).items()
-        }
-        feet = np.array([(tower.x, tower.y, tower.base) for tower in towers]).reshape(-1, 3)
-        _write_layer(path, "towers", "Point Z", shapely.points(feet), fields, crs)
-    _write_layer(path, "coverage", "Polygon", parts, {"area_m2": area}, crs)
-    _write_layer(path, "tiles", "Polygon", extents, attributes, crs)
+        write_tower_layer(path, "towers", towers, row_types(geneos), crs)
+    write_layer(path, "coverage", "Polygon", parts, {"area_m2": area}, crs)
+    write_layer(path, "tiles", "Polygon", extents, attributes, crs)
     drawn = [layer for layer in STYLES if layer != "towers" or towers is not None]
-    _add_styles(path, drawn)
+    add_styles(path, drawn)
 
 
 def coverage(spool: TileSpool) -> Any:
@@ -136,7 +152,52 @@ def coverage(spool: TileSpool) -> Any:
     return shapely.union_all(shapely.box(*low.T, *high.T))
 
 
-def _write_layer(
+def write_tower_layer(
+    path: str | Path,
+    name: str,
+    towers: Sequence[ListedTower],
+    columns: Mapping[str, type],
+    crs: pyproj.CRS | None,
+) -> None:
+    """Add a layer with the foot of each tower (PointZ) to a GeoPackage, or start it.
+
+    Args:
+        name: of the layer.
+        columns: column -> type of its values: ``int``, ``float`` or ``str``.
+        crs: of the survey; None if it is not known.
+    """
+    import shapely
+
+    rows = [tower.to_row() for tower in towers]
+    feet = np.array([(t.x, t.y, np.nan if t.base is None else t.base) for t in towers])
+    fields = {column: [row[column] for row in rows] for column in columns}
+    write_layer(
+        path, name, "Point Z", shapely.points(feet.reshape(-1, 3)), arrays(fields, columns), crs
+    )
+
+
+def arrays(
+    fields: Mapping[str, Sequence[Any]], columns: Mapping[str, type]
+) -> dict[str, np.ma.MaskedArray]:
+    """The values of columns as arrays, with a mask where a value is None.
+
+    The types make the columns of an empty table the same as those of a full one.
+
+    Args:
+        fields: column -> its values.
+        columns: column -> type of its values: ``int``, ``float`` or ``str``.
+    """
+    made: dict[str, np.ma.MaskedArray] = {}
+    for name, kind in columns.items():
+        mask = [value is None for value in fields[name]]
+        filled = [kind() if value is None else value for value in fields[name]]
+        made[name] = np.ma.array(
+            np.array(filled, dtype=object if kind is str else kind), mask=np.array(mask, bool)
+        )
+    return made
+
+
+def write_layer(
     path: str | Path,
     name: str,
     kind: str,
@@ -151,7 +212,7 @@ def _write_layer(
         name: of the layer.
         kind: geometry type of OGR, such as ``Point Z``.
         geometry: shapely geometries, one for each row.
-        fields: column -> its values, one for each row.
+        fields: column -> its values, one for each row; a masked one is null.
         crs: of the coordinates; None if it is not known.
     """
     import shapely
@@ -167,15 +228,16 @@ def _write_layer(
             driver="GPKG",
             geometry=shapely.to_wkb(np.asarray(geometry, object), output_dimension=3),
             geometry_type=kind,
-            field_data=list(fields.values()),
+            field_data=[np.ma.getdata(values) for values in fields.values()],
+            field_mask=[np.ma.getmaskarray(values) for values in fields.values()],
             fields=list(fields),
             crs=None if crs is None else crs.to_2d().to_wkt(),
             append=Path(path).exists(),
         )
 
 
-def _add_styles(path: str | Path, layers: Iterable[str]) -> None:
-    """Add the table from which QGIS takes the styles of ``layers``."""
+def add_styles(path: str | Path, layers: Iterable[str], styles: Mapping[str, str] = STYLES) -> None:
+    """Add the table from which QGIS takes the styles of ``layers``, by their names."""
     with closing(sqlite3.connect(path)) as database, database:
         database.execute(
             "CREATE TABLE layer_styles (id INTEGER PRIMARY KEY, f_table_catalog TEXT, "
@@ -192,5 +254,5 @@ def _add_styles(path: str | Path, layers: Iterable[str]) -> None:
             "INSERT INTO layer_styles (f_table_catalog, f_table_schema, f_table_name, "
             "f_geometry_column, styleName, styleQML, styleSLD, useAsDefault, update_time) "
             "VALUES ('', '', ?, 'geom', ?, ?, '', 1, ?)",
-            [(layer, layer, STYLES[layer], WRITTEN) for layer in layers],
+            [(layer, layer, styles[layer], WRITTEN) for layer in layers],
         )

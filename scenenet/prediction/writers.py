@@ -13,6 +13,7 @@ from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, write_json
 from scenenet.core.provenance import fingerprint, package_version
 from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.survey_tower import row_types
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.copc import write_copc
 from scenenet.prediction.file_status import write_status
@@ -136,7 +137,7 @@ def _write_lists(
         crs, sizes = prediction.crs, prediction.unit_sizes
         write_geojson(lists[files.geojson], prediction.towers, crs, sizes)
     if files.table is not None:
-        write_csv(lists[files.table], prediction.towers, prediction.geneos)
+        write_csv(lists[files.table], prediction.towers, row_types(prediction.geneos))
     if files.page is not None:
         write_page(prediction, lists[files.page])
     if files.status is not None:

@@ -1,39 +1,13 @@
-"""The command line called in this process, with a survey and a model that take no time."""
+"""A survey and a model that take no time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from scenenet.cli.app import main
 from scenenet.models.model_file import write_model
 from scenenet.pointcloud import write_las
-
-
-@dataclass(frozen=True)
-class Called:
-    """How a command ended."""
-
-    code: int
-    out: str
-    err: str
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Callable[..., Called]:
-    def run(*arguments: object) -> Called:
-        capsys.readouterr()
-        code = 0
-        try:
-            main([str(argument) for argument in arguments])
-        except SystemExit as end:
-            code = int(end.code or 0)
-        return Called(code, *capsys.readouterr())
-
-    return run
 
 
 @pytest.fixture

@@ -1,0 +1,1 @@
+"""What people know about the towers that were found: registers of their assets."""

@@ -1,0 +1,1 @@
+"""An asset register compared with the towers that were found."""

@@ -1,0 +1,1 @@
+"""Tables that people write: CSV files of spreadsheets, layers of GeoPackages and Shapefiles."""

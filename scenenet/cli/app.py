@@ -21,6 +21,7 @@ from scenenet.cli.commands import (
     geneo,
     predict,
     register,
+    review,
     synth,
     train,
 )
@@ -34,6 +35,7 @@ COMMANDS = {
     "predict": predict,
     "evaluate": evaluate,
     "explain": explain,
+    "review": review,
     "register": register,
     "bench": bench,
 }

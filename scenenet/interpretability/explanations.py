@@ -71,8 +71,7 @@ def explanations(
     Args:
         unit_sizes, unit_names: sizes in m of the units of x, y and z, and their names.
     """
-    units = _Units(*unit_sizes[1:], *unit_names[1:])
-    return [_explanation(tower, card, units) for tower in towers]
+    return [_explanation(tower, card, unit_sizes, unit_names) for tower in towers]
 
 
 class _Units(NamedTuple):
@@ -94,7 +93,13 @@ class _Units(NamedTuple):
         return SYMBOLS.get(self.vertical_name, self.vertical_name)
 
 
-def _explanation(tower: SurveyTower, card: ModelCard, units: _Units) -> TowerExplanation:
+def _explanation(
+    tower: SurveyTower,
+    card: ModelCard,
+    unit_sizes: tuple[float, float, float],
+    unit_names: tuple[str, str, str],
+) -> TowerExplanation:
+    units = _Units(*unit_sizes[1:], *unit_names[1:])
     shares = sorted(tower.contributions.items(), key=lambda item: -abs(item[1]))
     return TowerExplanation(
         tower.id,
@@ -106,7 +111,7 @@ def _explanation(tower: SurveyTower, card: ModelCard, units: _Units) -> TowerExp
         tower.probability,
         _evidence(tower, units),
         tuple((name, share, _sentence(share)) for name, share in shares),
-        _doubts(tower, card.tau, units),
+        doubts(tower, card.tau, unit_sizes, unit_names),
     )
 
 
@@ -125,32 +130,44 @@ def _evidence(tower: SurveyTower, units: _Units) -> tuple[str, ...]:
     )
 
 
-def _doubts(tower: SurveyTower, tau: float | None, units: _Units) -> tuple[str, ...]:
-    """Why a person should check a tower. A tower without any of these reasons is not doubtful."""
-    doubts = []
+def doubts(
+    tower: SurveyTower,
+    tau: float | None,
+    unit_sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    unit_names: tuple[str, str, str] = (METRE, METRE, METRE),
+) -> tuple[str, ...]:
+    """Why a person should check a tower. A tower without any of these reasons is not doubtful.
+
+    Args:
+        tower: in the units of the survey.
+        tau: of the model; None if it is not known.
+        unit_sizes, unit_names: as ``explanations``.
+    """
+    units = _Units(*unit_sizes[1:], *unit_names[1:])
+    reasons = []
     to_edge = tower.edge_distance * units.planar_m
     height = tower.height * units.vertical_m
     if to_edge < min(WIDEST_ARM * height, WIDEST_HEAD_M):
-        doubts.append(
+        reasons.append(
             f"it is {tower.edge_distance:.0f} {units.planar} from the edge of the data, nearer "
             "than crossarms may reach: part of it may be missing"
         )
     if tower.conductor_directions == 0:
-        doubts.append("no conductors were found that leave it: a lone pole or tree looks alike")
+        reasons.append("no conductors were found that leave it: a lone pole or tree looks alike")
     if tower.conductor_directions == 1 and to_edge >= FAR:
-        doubts.append("conductors leave it in one direction only: the end of a line, or no tower")
+        reasons.append("conductors leave it in one direction only: the end of a line, or no tower")
     if tower.points < FEW_POINTS_PER_M * height:
-        doubts.append(
+        reasons.append(
             f"it has {tower.points} points of its own, fewer than {FEW_POINTS_PER_M:.0f} per m of "
             "its height: its shape is hard to see"
         )
     if tau is not None and tower.probability < tau:
-        doubts.append(
+        reasons.append(
             f"its probability is below tau, {tau:.3f}: its conductors and its body support it"
         )
     elif tau is not None and tower.probability < (1 + tau) / 2:
-        doubts.append(f"its probability is not far above tau, {tau:.3f}")
-    return tuple(doubts)
+        reasons.append(f"its probability is not far above tau, {tau:.3f}")
+    return tuple(reasons)
 
 
 def _sentence(share: float) -> str:

@@ -31,7 +31,7 @@ COVERAGE_CELL = 8
 """Voxels along the edge of the cells that make up the coverage."""
 
 
-class ListedTower(Protocol):
+class TowerEntry(Protocol):
     """A tower as a list has it: one that was found, or one that people added."""
 
     @property
@@ -53,7 +53,7 @@ class ListedTower(Protocol):
         """The tower as a GeoJSON feature at ``coordinates``."""
 
 
-def write_csv(path: str | Path, towers: Iterable[ListedTower], columns: Iterable[str]) -> None:
+def write_csv(path: str | Path, towers: Iterable[TowerEntry], columns: Iterable[str]) -> None:
     """Write towers as CSV, with x and y in the coordinates of the survey."""
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, list(columns), lineterminator="\n")
@@ -63,7 +63,7 @@ def write_csv(path: str | Path, towers: Iterable[ListedTower], columns: Iterable
 
 def write_geojson(
     path: str | Path,
-    towers: Sequence[ListedTower],
+    towers: Sequence[TowerEntry],
     crs: pyproj.CRS | None,
     unit_sizes: tuple[float, float, float],
 ) -> None:
@@ -155,7 +155,7 @@ def coverage(spool: TileSpool) -> Any:
 def write_tower_layer(
     path: str | Path,
     name: str,
-    towers: Sequence[ListedTower],
+    towers: Sequence[TowerEntry],
     columns: Mapping[str, type],
     crs: pyproj.CRS | None,
 ) -> None:

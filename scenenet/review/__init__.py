@@ -1,1 +1,1 @@
-"""What people know about the towers that were found: registers of their assets."""
+"""What people know about the towers that were found: their decisions, and registers of assets."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,10 @@ LATITUDE_NAMES = ("lat", "latitude")
 
 DEGREES = 4326
 """EPSG code of longitude and latitude, where a table states no other system for them."""
+
+
+class NoPlaces(InputError):
+    """A table has no coordinates; arguments as ``InputError``."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,9 @@ class PlaceColumns:
                 is meant.
 
         Raises:
-            InputError: there are no such columns, or the file states another system than ``crs``.
+            NoPlaces: there are no coordinates.
+            InputError: there is no column ``x`` or ``y``, or the file states another system than
+                ``crs``.
         """
         import pyproj
 
@@ -79,9 +86,10 @@ class PlaceColumns:
         found = table.column(LONGITUDE_NAMES), table.column(LATITUDE_NAMES)
         if None not in found:
             return cls(*found, crs or pyproj.CRS(DEGREES))
-        raise table.error(
+        raise NoPlaces(
             f"no columns with coordinates among {', '.join(table.columns)}",
-            f"Call them {X_NAMES[0]} and {Y_NAMES[0]}, or {LONGITUDE_NAMES[0]} and "
+            file=table.path,
+            remedy=f"Call them {X_NAMES[0]} and {Y_NAMES[0]}, or {LONGITUDE_NAMES[0]} and "
             f"{LATITUDE_NAMES[0]}, or name them with --x and --y",
         )
 
@@ -133,15 +141,19 @@ def in_survey(
     plain = survey.to_2d()
     if same_system(crs.to_2d(), plain):
         return xy
-    from pyproj import Transformer
-
     if crs.is_geographic:
         wrong = (np.abs(xy) > [180.0, 90.0]).any(axis=1)
         _refuse(rows, xy, wrong, "it is no longitude and latitude in degrees")
-    there = Transformer.from_crs(crs.to_2d(), plain, always_xy=True)
-    moved = np.column_stack(there.transform(*xy.T))
+    moved = np.column_stack(_conversion(crs.to_2d(), plain).transform(*xy.T))
     _refuse(rows, xy, ~np.isfinite(moved).all(axis=1), f"it is outside of {plain.name}")
     return moved
+
+
+@cache
+def _conversion(crs: pyproj.CRS, survey: pyproj.CRS) -> pyproj.Transformer:
+    from pyproj import Transformer
+
+    return Transformer.from_crs(crs, survey, always_xy=True)
 
 
 def _refuse(rows: Sequence[Row], xy: np.ndarray, wrong: np.ndarray, problem: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -14,12 +15,12 @@ from scenenet.core.outputs import Output
 from scenenet.core.provenance import fingerprint
 
 OUTPUTS = "outputs"
-"""Key of the record with the fingerprint of each file, by its name."""
+"""Key of the record with the fingerprint of each file, by its path."""
 
 
 @dataclass(frozen=True)
 class RecordedFiles:
-    """Files in one folder that are written together, with a record of their content.
+    """Files that are written together, with a record of their content.
 
     Attributes:
         record: JSON file with the result as plain values, and ``OUTPUTS``.
@@ -36,10 +37,23 @@ class RecordedFiles:
     def is_own(self, path: Path) -> bool:
         """Whether a file is as an earlier call wrote it."""
         try:
-            known = read_json(self.record)[OUTPUTS]
-            return path == self.record or known.get(path.name) == fingerprint(path)
-        except (InputError, AttributeError, KeyError, OSError, TypeError, ValueError):
+            if path == self.record:
+                return isinstance(read_json(path)[OUTPUTS], dict)
+            return self._known().get(self._key(path)) == fingerprint(path)
+        except (InputError, KeyError, OSError, TypeError, ValueError):
             return False
+
+    def _known(self) -> dict[str, str]:
+        """The fingerprints in the record; none if there is no record of this kind."""
+        try:
+            known = read_json(self.record)[OUTPUTS]
+        except (KeyError, OSError, TypeError, ValueError):
+            return {}
+        return known if isinstance(known, dict) else {}
+
+    def _key(self, path: Path) -> str:
+        """Name of a file in the record: its path from the folder of the record."""
+        return Path(os.path.relpath(path, self.record.parent)).as_posix()
 
     @contextmanager
     def writing(self, result: Mapping[str, Any]) -> Iterator[dict[Path, Path]]:
@@ -55,5 +69,6 @@ class RecordedFiles:
             partial = {path: stack.enter_context(atomic(path)) for path in self.files}
             record = stack.enter_context(atomic(self.record))
             yield partial
-            prints = {path.name: fingerprint(written) for path, written in partial.items()}
-            write_json(record, {**result, OUTPUTS: prints})
+            prints = {self._key(path): fingerprint(written) for path, written in partial.items()}
+            # What an earlier call wrote and this one does not stays known as its own.
+            write_json(record, {**result, OUTPUTS: {**self._known(), **prints}})

@@ -8,6 +8,7 @@ import numpy as np
 import pyproj
 import pytest
 from fixtures.review_files import rows_of
+from fixtures.scenes import PLACE
 
 from scenenet.cli.app import main
 from scenenet.models.model_file import write_model
@@ -16,12 +17,20 @@ from scenenet.pointcloud import PointCloud, write_las
 UNIT = 32629
 POLES = [(20.5 + 30 * i, 20.5) for i in range(12)]
 """Places of the poles of the line, relative to ``fixtures.scenes.PLACE``."""
+LOW_POLE, LOW_M = (95.5, 33.5), 8.0
+"""Place of a pole that is too low to be found, and its height, m."""
 
 
 @pytest.fixture(scope="package")
 def found(scene, pole_finder, tmp_path_factory) -> Path:
-    """The folder with the prediction of a line of poles, which nobody has labelled."""
-    cloud = scene(POLES, size=(370.0, 41.0), tree=(35.0, 8.0))
+    """The folder with the prediction of poles in a line and a low one beside it, not labelled."""
+    line = scene(POLES, size=(370.0, 41.0), tree=(35.0, 8.0))
+    z = np.arange(0.05, LOW_M, 0.05)
+    around = np.random.default_rng(1).uniform(-0.2, 0.2, (len(z), 2))
+    pole = np.column_stack([around + LOW_POLE, z]) + PLACE
+    cloud = PointCloud(
+        np.concatenate([line.xyz, pole]), np.append(line.classification, np.ones(len(z), np.uint8))
+    )
     folder = tmp_path_factory.mktemp("line")
     survey, model, out = folder / "line.laz", folder / "by-hand.json", folder / "found"
     codes = np.where(cloud.classification == 15, 1, cloud.classification).astype(np.uint8)
@@ -46,3 +55,10 @@ def towers(found) -> list[dict[str, str]]:
     rows = rows_of(found / "line.towers.csv")
     assert len(rows) == len(POLES)
     return sorted(rows, key=lambda row: float(row["x"]))
+
+
+@pytest.fixture
+def pole_model(pole_finder, tmp_path) -> Path:
+    path = tmp_path / "by-hand.json"
+    write_model(path, *pole_finder)
+    return path

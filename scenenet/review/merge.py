@@ -1,0 +1,244 @@
+"""Decisions merged with the towers that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from scenenet.core.errors import InputError
+from scenenet.detection.find import APART_M
+from scenenet.detection.tower_ids import EAST, NORTH, tower_ids
+from scenenet.review.decisions import Decision, Said, Statements
+from scenenet.review.found_list import FoundList, ListedTower
+from scenenet.review.reviewed_tower import Decided, ReviewedTower
+
+MATCH_M = 5.0
+"""m, planar: a row without an id means the nearest tower, if that is as near as a hit is."""
+
+
+@dataclass(frozen=True)
+class Review:
+    """A tower list after a review.
+
+    Attributes:
+        towers: of the list, in its order, then those that were added.
+        unmatched: rows that name a place where no tower was found, as sentences.
+        warnings: what looks wrong, as sentences.
+        undecided: number of rows that say nothing.
+    """
+
+    towers: tuple[ReviewedTower, ...]
+    unmatched: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    undecided: int = 0
+
+    def decided(self, *decisions: Decided) -> list[ReviewedTower]:
+        """The towers with one of these decisions."""
+        return [tower for tower in self.towers if tower.decision in decisions]
+
+    @property
+    def kept(self) -> list[ReviewedTower]:
+        """The towers that were not rejected."""
+        return self.decided("accepted", "not reviewed", "added")
+
+    def counts(self) -> dict[str, int]:
+        """Number of towers with each decision, and of those with a comment."""
+        return {
+            "found": len(self.towers) - len(self.decided("added")),
+            "accepted": len(self.decided("accepted")),
+            "rejected": len(self.decided("rejected")),
+            "added": len(self.decided("added")),
+            "not_reviewed": len(self.decided("not reviewed")),
+            "comments": sum(bool(tower.comment) for tower in self.towers),
+        }
+
+
+@dataclass
+class _About:
+    """What was said about one tower."""
+
+    said: list[Said] = field(default_factory=list)
+    errors: list[InputError] = field(default_factory=list)
+
+    def add(self, said: Said) -> None:
+        other = next((o for o in self.said if {o.decision, said.decision} == _OPPOSITE), None)
+        if other is not None:
+            self.errors.append(
+                said.row.error(
+                    f"it says {said.decision}, and {other.row.file.name}, {other.row.place} says "
+                    f"{other.decision} of the same tower",
+                    "Delete one of the two rows",
+                )
+            )
+        self.said.append(said)
+
+    @property
+    def decision(self) -> Decided:
+        words: set[Decision] = {said.decision for said in self.said}
+        return "rejected" if "reject" in words else "accepted" if "accept" in words else _OPEN
+
+
+_OPPOSITE = {"accept", "reject"}
+_OPEN: Decided = "not reviewed"
+
+
+def merge(found: FoundList, statements: Statements) -> tuple[Review, list[InputError]]:
+    """Merge decisions with a tower list.
+
+    Args:
+        statements: of ``read_decisions``.
+
+    Returns:
+        the review, and the errors of rows that name no tower, contradict another row, or add a
+        tower where one stands. With an error the review is not complete.
+    """
+    errors = list(statements.errors)
+    about: dict[int, _About] = {}
+    unmatched: list[str] = []
+    for said in statements.said:
+        if said.decision == "add":
+            continue
+        try:
+            tower = _tower_of(said, found)
+        except InputError as error:
+            errors.append(error)
+            continue
+        if tower is None:
+            unmatched.append(_no_tower(said, found))
+        else:
+            about.setdefault(tower.id, _About()).add(said)
+    errors += [error for each in about.values() for error in each.errors]
+    towers = [_reviewed(tower, about.get(tower.id, _About())) for tower in found.towers]
+    standing = [tower for tower in towers if tower.decision != "rejected"]
+    added: list[ReviewedTower] = []
+    for said in statements.said:
+        if said.decision == "add":
+            try:
+                added.append(_added(said, found, [*standing, *added], [*towers, *added]))
+            except InputError as error:
+                errors.append(error)
+    warnings = _outside(added, found)
+    review = Review((*towers, *added), tuple(unmatched), tuple(warnings), statements.undecided)
+    return review, errors
+
+
+def _tower_of(said: Said, found: FoundList) -> ListedTower | None:
+    """The tower that a row means; None if it stands at a place without one.
+
+    Raises:
+        InputError: it names no tower, one that is not in the list, or one that stands elsewhere.
+    """
+    apart = np.full(len(found.towers), np.inf)
+    if said.place is not None:
+        apart = np.hypot(*(found.places - said.place).T) * found.unit_sizes[0]
+    if said.id is None:
+        if said.place is None:
+            raise said.row.error("it names no tower", "Give its id, or its x and y")
+        nearest = int(np.argmin(apart)) if len(apart) else None
+        if nearest is None or apart[nearest] > MATCH_M:
+            return None
+        return found.towers[nearest]
+    number = next((n for n, tower in enumerate(found.towers) if tower.id == said.id), None)
+    if number is None:
+        raise said.row.error(
+            f"no tower of {found.path.name} has the id {said.id}",
+            "Correct the id, or leave it empty and give x and y",
+        )
+    if said.place is not None and apart[number] > MATCH_M:
+        raise said.row.error(
+            f"tower {said.id} stands {apart[number]:.1f} m from the coordinates of this row",
+            "Correct the id or the coordinates. To move a tower, reject it and add it again",
+        )
+    return found.towers[number]
+
+
+def _no_tower(said: Said, found: FoundList) -> str:
+    x, y = said.place or (np.nan, np.nan)
+    return (
+        f"{said.row.file}: {said.row.place}: {said.decision}: no tower was found within "
+        f"{MATCH_M:g} m of {x:.2f}, {y:.2f}"
+    )
+
+
+def _reviewed(tower: ListedTower, about: _About) -> ReviewedTower:
+    return ReviewedTower(
+        tower.id,
+        tower.x,
+        tower.y,
+        tower.values.get("base"),
+        tower.values,
+        about.decision,
+        *_texts(about.said),
+    )
+
+
+def _texts(said: Sequence[Said]) -> tuple[str, str]:
+    """The comments and the reviewers, each once."""
+    comments = dict.fromkeys(each.comment for each in said if each.comment)
+    people = dict.fromkeys(each.reviewer for each in said if each.reviewer)
+    return " | ".join(comments), " | ".join(people)
+
+
+def _added(
+    said: Said,
+    found: FoundList,
+    standing: Sequence[ReviewedTower],
+    numbered: Sequence[ReviewedTower],
+) -> ReviewedTower:
+    """The tower that a row adds.
+
+    Args:
+        standing: the towers that were not rejected, and those that other rows add.
+        numbered: all that have an id.
+
+    Raises:
+        InputError: it has no place, an id, or stands where another tower does.
+    """
+    if said.place is None:
+        raise said.row.error("a tower is added without coordinates", "Give its x and y")
+    if said.id is not None:
+        raise said.row.error(
+            f"a tower is added with the id {said.id}",
+            "Leave the id empty: it follows from the place",
+        )
+    x, y = said.place
+    size = found.unit_sizes[0]
+    for other in standing:
+        apart = float(np.hypot(other.x - x, other.y - y)) * size
+        if apart <= APART_M:
+            raise said.row.error(
+                f"a tower is added {apart:.1f} m from tower {other.id}"
+                + (", which another row adds" if other.decision == "added" else ""),
+                "Delete one of the two rows" if other.decision == "added"
+                else f"Accept tower {other.id}, or reject it in another row",
+            )  # fmt: skip
+    values: dict[str, Any] = dict.fromkeys(found.columns)
+    number = _free_id(np.array([[x, y]]) * size, {tower.id for tower in numbered})
+    values |= {"id": number, "x": x, "y": y}
+    values |= {n: v for n, v in (("base", said.base), ("height", said.height)) if n in values}
+    return ReviewedTower(number, x, y, said.base, values, "added", said.comment, said.reviewer)
+
+
+def _free_id(place: np.ndarray, taken: set[int]) -> int:
+    """The id of a tower at a place (1, 2) m, or the next one that is free."""
+    [number] = tower_ids(place)
+    while number in taken or number == 0:
+        number = (number + 1) % (EAST * NORTH)
+    return number
+
+
+def _outside(added: Sequence[ReviewedTower], found: FoundList) -> list[str]:
+    """What is said about added towers where the survey has no points."""
+    import shapely
+
+    if found.coverage is None:
+        return []
+    return [
+        f"tower {tower.id}, which was added at {tower.x:.2f}, {tower.y:.2f}, stands outside the "
+        "coverage of the survey"
+        for tower in added
+        if not shapely.covers(found.coverage, shapely.Point(tower.x, tower.y))
+    ]

@@ -14,11 +14,9 @@ from scenenet.core.scratch import temporary_directory
 from scenenet.pointcloud.copc import SUFFIX
 from scenenet.prediction.page.survey_page import PAGE_BYTES
 from scenenet.prediction.predict import scratch_bytes
+from scenenet.prediction.summary import SUMMARY
 from scenenet.prediction.survey_files import SurveyFiles, result_name
 from scenenet.prediction.work.work_folder import WorkFolder
-
-SUMMARY = ".summary.json"
-
 
 RESULT_BYTES = 12
 """Bytes that a point takes in the result, beyond those in the survey. Most measured on airborne and

@@ -9,6 +9,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
+SUMMARY = ".summary.json"
+"""What follows the name of the survey in the name of its summary."""
+
 
 @dataclass(frozen=True)
 class PredictionSummary:

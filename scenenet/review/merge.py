@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -96,66 +96,90 @@ def merge(found: FoundList, statements: Statements) -> tuple[Review, list[InputE
         tower where one stands. With an error the review is not complete.
     """
     errors = list(statements.errors)
+    known = _Towers(found)
     about: dict[int, _About] = {}
     unmatched: list[str] = []
     for said in statements.said:
         if said.decision == "add":
             continue
         try:
-            tower = _tower_of(said, found)
+            tower = known.meant(said)
         except InputError as error:
             errors.append(error)
             continue
         if tower is None:
-            unmatched.append(_no_tower(said, found))
+            unmatched.append(_no_tower(said))
         else:
             about.setdefault(tower.id, _About()).add(said)
     errors += [error for each in about.values() for error in each.errors]
     towers = [_reviewed(tower, about.get(tower.id, _About())) for tower in found.towers]
-    standing = [tower for tower in towers if tower.decision != "rejected"]
+    rejected = {tower.id for tower in towers if tower.decision == "rejected"}
+    taken = {tower.id for tower in towers}
     added: list[ReviewedTower] = []
     for said in statements.said:
-        if said.decision == "add":
-            try:
-                added.append(_added(said, found, [*standing, *added], [*towers, *added]))
-            except InputError as error:
-                errors.append(error)
+        if said.decision != "add":
+            continue
+        try:
+            _require_free(said, known, rejected, added, found.unit_sizes[0])
+            added.append(_added(said, found, taken))
+            taken.add(added[-1].id)
+        except InputError as error:
+            errors.append(error)
     warnings = _outside(added, found)
     review = Review((*towers, *added), tuple(unmatched), tuple(warnings), statements.undecided)
     return review, errors
 
 
-def _tower_of(said: Said, found: FoundList) -> ListedTower | None:
-    """The tower that a row means; None if it stands at a place without one.
+class _Towers:
+    """The towers of a list, by id and by place."""
 
-    Raises:
-        InputError: it names no tower, one that is not in the list, or one that stands elsewhere.
-    """
-    apart = np.full(len(found.towers), np.inf)
-    if said.place is not None:
-        apart = np.hypot(*(found.places - said.place).T) * found.unit_sizes[0]
-    if said.id is None:
-        if said.place is None:
-            raise said.row.error("it names no tower", "Give its id, or its x and y")
-        nearest = int(np.argmin(apart)) if len(apart) else None
-        if nearest is None or apart[nearest] > MATCH_M:
-            return None
-        return found.towers[nearest]
-    number = next((n for n, tower in enumerate(found.towers) if tower.id == said.id), None)
-    if number is None:
-        raise said.row.error(
-            f"no tower of {found.path.name} has the id {said.id}",
-            "Correct the id, or leave it empty and give x and y",
-        )
-    if said.place is not None and apart[number] > MATCH_M:
-        raise said.row.error(
-            f"tower {said.id} stands {apart[number]:.1f} m from the coordinates of this row",
-            "Correct the id or the coordinates. To move a tower, reject it and add it again",
-        )
-    return found.towers[number]
+    def __init__(self, found: FoundList) -> None:
+        from scipy.spatial import cKDTree
+
+        self._found, self._size = found, found.unit_sizes[0]
+        self._by_id = {tower.id: tower for tower in found.towers}
+        self._tree = cKDTree(found.places * self._size) if found.towers else None
+
+    def meant(self, said: Said) -> ListedTower | None:
+        """The tower that a row means; None if it stands at a place without one.
+
+        Raises:
+            InputError: it names no tower, one that is not in the list, or one that stands
+                elsewhere.
+        """
+        if said.id is None:
+            if said.place is None:
+                raise said.row.error("it names no tower", "Give its id, or its x and y")
+            near = self.within(said.place, MATCH_M)
+            return near[0] if near else None
+        tower = self._by_id.get(said.id)
+        if tower is None:
+            raise said.row.error(
+                f"no tower of {self._found.path.name} has the id {said.id}",
+                "Correct the id, or leave it empty and give x and y",
+            )
+        if said.place is not None:
+            x, y = said.place
+            apart = float(np.hypot(tower.x - x, tower.y - y)) * self._size
+            if apart > MATCH_M:
+                raise said.row.error(
+                    f"tower {said.id} stands {apart:.1f} m from the coordinates of this row",
+                    "Correct the id or the coordinates. To move a tower, reject it and add it "
+                    "again",
+                )
+        return tower
+
+    def within(self, place: tuple[float, float], radius: float) -> list[ListedTower]:
+        """The towers within a radius in m of a place in the units of the survey, nearest first."""
+        if self._tree is None:
+            return []
+        at = np.array(place) * self._size
+        rows = self._tree.query_ball_point(at, radius)
+        apart = np.hypot(*(self._tree.data[rows] - at).T)
+        return [self._found.towers[rows[number]] for number in np.argsort(apart, kind="stable")]
 
 
-def _no_tower(said: Said, found: FoundList) -> str:
+def _no_tower(said: Said) -> str:
     x, y = said.place or (np.nan, np.nan)
     return (
         f"{said.row.file}: {said.row.place}: {said.decision}: no tower was found within "
@@ -182,47 +206,64 @@ def _texts(said: Sequence[Said]) -> tuple[str, str]:
     return " | ".join(comments), " | ".join(people)
 
 
-def _added(
+def _require_free(
     said: Said,
-    found: FoundList,
-    standing: Sequence[ReviewedTower],
-    numbered: Sequence[ReviewedTower],
-) -> ReviewedTower:
-    """The tower that a row adds.
+    known: _Towers,
+    rejected: Set[int],
+    added: Sequence[ReviewedTower],
+    size: float,
+) -> None:
+    """Refuse to add a tower where one stands.
 
     Args:
-        standing: the towers that were not rejected, and those that other rows add.
-        numbered: all that have an id.
+        rejected: ids of the towers that no longer count.
+        added: what other rows add.
+        size: m, of a unit in plan.
 
     Raises:
-        InputError: it has no place, an id, or stands where another tower does.
+        InputError: a tower stands there, or the row has no coordinates.
     """
     if said.place is None:
         raise said.row.error("a tower is added without coordinates", "Give its x and y")
+    for other in known.within(said.place, APART_M):
+        if other.id not in rejected:
+            raise said.row.error(
+                f"a tower is added within {APART_M:g} m of tower {other.id}",
+                f"Accept tower {other.id}, or reject it in another row",
+            )
+    x, y = said.place
+    for new in added:
+        if np.hypot(new.x - x, new.y - y) * size <= APART_M:
+            raise said.row.error(
+                f"a tower is added within {APART_M:g} m of one that another row adds",
+                "Delete one of the two rows",
+            )
+
+
+def _added(said: Said, found: FoundList, taken: Set[int]) -> ReviewedTower:
+    """The tower that a row adds.
+
+    Args:
+        taken: ids of all towers.
+
+    Raises:
+        InputError: the row has an id.
+    """
     if said.id is not None:
         raise said.row.error(
             f"a tower is added with the id {said.id}",
             "Leave the id empty: it follows from the place",
         )
+    assert said.place is not None  # _require_free
     x, y = said.place
-    size = found.unit_sizes[0]
-    for other in standing:
-        apart = float(np.hypot(other.x - x, other.y - y)) * size
-        if apart <= APART_M:
-            raise said.row.error(
-                f"a tower is added {apart:.1f} m from tower {other.id}"
-                + (", which another row adds" if other.decision == "added" else ""),
-                "Delete one of the two rows" if other.decision == "added"
-                else f"Accept tower {other.id}, or reject it in another row",
-            )  # fmt: skip
     values: dict[str, Any] = dict.fromkeys(found.columns)
-    number = _free_id(np.array([[x, y]]) * size, {tower.id for tower in numbered})
+    number = _free_id(np.array([[x, y]]) * found.unit_sizes[0], taken)
     values |= {"id": number, "x": x, "y": y}
     values |= {n: v for n, v in (("base", said.base), ("height", said.height)) if n in values}
     return ReviewedTower(number, x, y, said.base, values, "added", said.comment, said.reviewer)
 
 
-def _free_id(place: np.ndarray, taken: set[int]) -> int:
+def _free_id(place: np.ndarray, taken: Set[int]) -> int:
     """The id of a tower at a place (1, 2) m, or the next one that is free."""
     [number] = tower_ids(place)
     while number in taken or number == 0:

@@ -193,7 +193,7 @@ FAULTS = {
     "elsewhere": (
         said(id="{0}", x=500_200, y=4_630_020, decision="accept"), "from the coordinates of this",
     ),
-    "occupied": (said(x="{x}", y="{y}", decision="add"), "a tower is added 0.0 m from tower"),
+    "occupied": (said(x="{x}", y="{y}", decision="add"), "a tower is added within 2 m of tower"),
 }  # fmt: skip
 
 
@@ -233,7 +233,7 @@ def test_rows_that_contradict_each_other_are_named(call, found, towers, tmp_path
     done = call("review", found, *files)
     assert done.code == 1
     assert "two.csv: row 2: it says reject, and one.csv, row 2 says accept" in done.err
-    assert "two.csv: row 4: a tower is added 1.0 m from tower" in done.err
+    assert "two.csv: row 4: a tower is added within 2 m of one that another row adds" in done.err
 
 
 def test_a_tower_is_moved_by_rejecting_and_adding_it(call, found, towers, tmp_path):

@@ -27,11 +27,13 @@ class Assets:
     """The assets of a register.
 
     Attributes:
+        path: its file.
         ids: of those with a place, as in the file; the place in the file where it has no ids.
         xy: (N, 2) their places, in the system and the units of the survey.
         without_place: ids of the others.
     """
 
+    path: Path
     ids: tuple[str, ...]
     xy: np.ndarray
     without_place: tuple[str, ...]
@@ -79,7 +81,8 @@ def read_assets(
         placed.append(name)
     if not places:
         raise table.error("none of its assets has coordinates")
-    return Assets(tuple(placed), in_survey(rows, places, columns.crs, survey), tuple(without))
+    xy = in_survey(rows, places, columns.crs, survey)
+    return Assets(table.path, tuple(placed), xy, tuple(without))
 
 
 def _ids(table: Table, wanted: str | None) -> Sequence[str]:

@@ -168,7 +168,7 @@ def _require_near(found: FoundList, assets: Assets, size: float) -> None:
         raise InputError(
             f"none of the assets is within {FAR_M / 1000:.0f} km of the survey; the nearest is "
             f"{nearest.min() * size / 1000:.0f} km away",
-            file=found.path,
+            file=assets.path,
             remedy="Check the coordinate system of the register (--crs), and the order of its "
             "columns (--x, --y)",
         )

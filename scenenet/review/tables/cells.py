@@ -5,8 +5,13 @@ from __future__ import annotations
 import math
 import re
 
-SPACES = re.compile(r"[\s\u00a0\u202f']")
-"""What separates thousands beside points and commas."""
+EXPONENT = r"(?:[eE][+-]?\d+)?"
+PLAIN = re.compile(rf"[+-]?(?:\d+[.,]?\d*|[.,]\d+){EXPONENT}")
+GROUPED = (
+    re.compile(rf"[+-]?\d{{1,3}}(?P<sign>[,'’\s])\d{{3}}(?:(?P=sign)\d{{3}})*(?:\.\d*)?{EXPONENT}"),
+    re.compile(rf"[+-]?\d{{1,3}}(?P<sign>[.'’\s])\d{{3}}(?:(?P=sign)\d{{3}})*(?:,\d*)?{EXPONENT}"),
+)
+"""Numbers with separators of thousands, with a decimal point and with a decimal comma."""
 
 
 def text_of(cell: object) -> str:
@@ -21,8 +26,8 @@ def text_of(cell: object) -> str:
 def number_of(cell: object) -> float | None:
     """The cell as a number; None for an empty one.
 
-    Of a text with both signs, the last of point and comma separates the decimals. A sign that
-    occurs twice separates thousands; one that occurs once separates the decimals.
+    A single point or comma separates the decimals. Separators of thousands stand before groups of
+    three digits, and the other one of the two separates the decimals then.
 
     Raises:
         ValueError: it is no finite number.
@@ -32,19 +37,24 @@ def number_of(cell: object) -> float | None:
         if math.isnan(number):
             return None
     else:
-        text = SPACES.sub("", text_of(cell))
+        text = text_of(cell)
         if not text:
             return None
-        point, comma = text.rfind("."), text.rfind(",")
-        decimal = "," if comma > point else "."
-        if text.count(decimal) > 1:
-            decimal = ""
-        text = text.replace("," if decimal == "." else ".", "")
-        text = text.replace(",", "." if decimal == "," else "")
-        number = float(text) if re.fullmatch(r"[+-]?[\d.]+(?:[eE][+-]?\d+)?", text) else math.nan
+        number = _parsed(text)
     if not math.isfinite(number):
         raise ValueError(f"{cell!r} is no number")
     return number
+
+
+def _parsed(text: str) -> float:
+    """The number in a text; NaN if it is none."""
+    if PLAIN.fullmatch(text):
+        return float(text.replace(",", "."))
+    for pattern, decimal in zip(GROUPED, ".,", strict=True):
+        if pattern.fullmatch(text):
+            kept = "".join(sign for sign in text if sign in f"0123456789+-eE{decimal}")
+            return float(kept.replace(",", "."))
+    return math.nan
 
 
 def whole_number_of(cell: object) -> int | None:

@@ -11,12 +11,10 @@ import numpy as np
 from scenenet.core.errors import InputError
 from scenenet.detection.find import APART_M
 from scenenet.detection.tower_ids import EAST, NORTH, tower_ids
+from scenenet.metrics.tower_matching import HIT_DISTANCE_M
 from scenenet.review.decisions import Decision, Said, Statements
 from scenenet.review.found_list import FoundList, ListedTower
 from scenenet.review.reviewed_tower import Decided, ReviewedTower
-
-MATCH_M = 5.0
-"""m, planar: a row without an id means the nearest tower, if that is as near as a hit is."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,8 @@ class _Towers:
         if said.id is None:
             if said.place is None:
                 raise said.row.error("it names no tower", "Give its id, or its x and y")
-            near = self.within(said.place, MATCH_M)
+            # The nearest one, if it is as near as a hit is.
+            near = self.within(said.place, HIT_DISTANCE_M)
             return near[0] if near else None
         tower = self._by_id.get(said.id)
         if tower is None:
@@ -161,7 +160,7 @@ class _Towers:
         if said.place is not None:
             x, y = said.place
             apart = float(np.hypot(tower.x - x, tower.y - y)) * self._size
-            if apart > MATCH_M:
+            if apart > HIT_DISTANCE_M:
                 raise said.row.error(
                     f"tower {said.id} stands {apart:.1f} m from the coordinates of this row",
                     "Correct the id or the coordinates. To move a tower, reject it and add it "
@@ -183,7 +182,7 @@ def _no_tower(said: Said) -> str:
     x, y = said.place or (np.nan, np.nan)
     return (
         f"{said.row.file}: {said.row.place}: {said.decision}: no tower was found within "
-        f"{MATCH_M:g} m of {x:.2f}, {y:.2f}"
+        f"{HIT_DISTANCE_M:g} m of {x:.2f}, {y:.2f}"
     )
 
 

@@ -197,3 +197,23 @@ def test_labels_around_a_rejected_tower_end_and_those_of_its_neighbour_stay():
     codes, numbers = relabelling.apply(points, relabelling.cleared(xyz))
     assert (codes[:400] == OTHER).all() and (codes[400:] == TOWER).all()
     assert set(numbers) == {0, 8}
+
+
+@pytest.mark.parametrize("name", ["pylon_002", "pylon_003"])
+def test_a_recorded_pylon_that_is_added_again_gets_the_points_that_it_had(
+    call, real_data, tmp_path, name
+):
+    """A person points 1.5 m beside its axis; it is measured there as it was found."""
+    done = call("predict", real_data / "pylons" / f"{name}.laz", "--out", tmp_path / "found")
+    assert done.code == 0, done.err
+    [tower] = rows_of(tmp_path / "found" / f"{name}.towers.csv")
+    x, y = place(tower)
+    rows = [(tower["id"], "", "", "reject"), ("", x + 1.5, y, "add")]
+    review = write_rows(tmp_path / "review.csv", COLUMNS, rows)
+    labelled(call, tmp_path / "found", review, tmp_path / "labelled.laz")
+    before = laspy.read(tmp_path / "found" / f"{name}.laz").tower_id > 0
+    after = laspy.read(tmp_path / "labelled.laz").tower_id > 0
+    assert (before & after).sum() / (before | after).sum() > 0.9
+    [added] = rows_of(tmp_path / f"{name}.reviewed.csv")
+    assert float(added["height"]) == pytest.approx(float(tower["height"]), abs=0.1)
+    assert added["conductor_directions"] == tower["conductor_directions"]

@@ -276,3 +276,25 @@ def test_options_that_do_not_go_together_are_refused(call, found, decisions, tmp
     assert call("review", found, "--decisions", decisions, "--labels", "l.laz").code == 2
     assert call("review", found, "--decisions", decisions, "--accept-rest").code == 2
     assert call("review", found, "--template", tmp_path / "t.pdf").code == 1
+
+
+def test_a_survey_without_towers_can_be_reviewed_and_compared(call, found, tmp_path):
+    header = (found / "line.towers.csv").read_text().splitlines()[0]
+    (tmp_path / "line.towers.csv").write_text(header + "\n")
+    for name in ("line.gpkg", "line.laz", "line.summary.json"):
+        (tmp_path / name).write_bytes((found / name).read_bytes())
+    for ending in ("csv", "gpkg"):
+        assert call("review", tmp_path, "--template", tmp_path / f"t.{ending}").code == 0
+        done = call("review", tmp_path, "--decisions", tmp_path / f"t.{ending}", "--json")
+        assert done.code == 0, done.err
+        assert json.loads(done.out)["counts"]["found"] == 0
+    review = write_rows(
+        tmp_path / "add.csv", COLUMNS, [said(x=ADDED[0], y=ADDED[1], decision="add")]
+    )
+    labels = ("--labels", tmp_path / "labelled.laz", "--codes", "asprs")
+    assert call("review", tmp_path, "--decisions", review, *labels).code == 0
+    [added] = rows_of(tmp_path / "line.reviewed.csv")
+    assert float(added["height"]) == pytest.approx(8.0, abs=0.3)
+    assets = write_rows(tmp_path / "assets.csv", ("id", "x", "y"), [("a", *ADDED)])
+    done = call("register", tmp_path, "--assets", assets, "--json")
+    assert json.loads(done.out)["counts"]["missing"] == 1

@@ -10,8 +10,8 @@ from scenenet.detection.conductor_rules import FAR, FURTHEST_M
 from scenenet.detection.find import MeasuredTower, find_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in
+from scenenet.metrics.tower_matching import HIT_DISTANCE_M
 from scenenet.review.labels.points import Points
-from scenenet.review.merge import MATCH_M
 
 AROUND_M = FURTHEST_M + FAR
 """m around a place of which the detection needs points."""
@@ -65,6 +65,6 @@ def measure_at(
 def _nearest(place: np.ndarray, towers: Sequence[MeasuredTower]) -> MeasuredTower | None:
     """The tower nearest to a place (2,) m, if it is as near as a hit is."""
     apart = [float(np.hypot(tower.x - place[0], tower.y - place[1])) for tower in towers]
-    if not apart or min(apart) > MATCH_M:
+    if not apart or min(apart) > HIT_DISTANCE_M:
         return None
     return towers[int(np.argmin(apart))]

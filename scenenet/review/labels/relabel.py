@@ -10,9 +10,10 @@ import numpy as np
 from scenenet.core.errors import InputError
 from scenenet.dataset.labelled_towers import TowerSettings, cluster
 from scenenet.detection.find import MeasuredTower
+from scenenet.metrics.tower_matching import HIT_DISTANCE_M
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.review.labels.points import Points
-from scenenet.review.merge import MATCH_M, Review
+from scenenet.review.merge import Review
 from scenenet.review.reviewed_tower import ReviewedTower
 
 OTHER = "Unclassified"
@@ -108,7 +109,7 @@ class Relabelling:
         if len(self._kept_at):
             kept = cKDTree(self._kept_at)
             others, _ = kept.query(labelled[:, :2])
-        at_rejected = np.unique(label[apart <= MATCH_M])
+        at_rejected = np.unique(label[apart <= HIT_DISTANCE_M])
         return np.isin(label, at_rejected) & (apart < others)
 
     def apply(self, points: Points, cleared: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,12 +13,13 @@ import pyproj
 import pyproj.exceptions
 
 from scenenet.core.errors import InputError
+from scenenet.line.catenary import Catenary
 from scenenet.pointcloud.class_schemes import EDP
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.synthetic.annotation_noise import annotate
 from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.returns.clutter import clutter_points
-from scenenet.synthetic.returns.conductors import conductor_points, other_cables
+from scenenet.synthetic.returns.conductors import conductor_points, middles, other_cables
 from scenenet.synthetic.returns.flight import Flight, flight_of
 from scenenet.synthetic.returns.scan import Scanner
 from scenenet.synthetic.returns.stray_returns import stray_points
@@ -30,29 +31,10 @@ from scenenet.synthetic.scene.terrain import Terrain
 from scenenet.synthetic.scene.towers import place, sample
 from scenenet.synthetic.scene.vegetation import WIDEST_CROWN_M, Vegetation, keep_clear
 from scenenet.synthetic.settings import SyntheticSettings
+from scenenet.synthetic.truth import TrueConductor, TrueTower
 
 Coded = tuple[np.ndarray, np.ndarray]
 """Points (N, 3) and their codes (N,)."""
-
-
-@dataclass(frozen=True)
-class TrueTower:
-    """A tower of the corridor: what a detector should report.
-
-    Attributes:
-        id: 1, 2, ... along the line.
-        x, y: centre of the foot, m, in the survey's CRS.
-        base: elevation of the ground at the foot, m.
-        height: from the foot to the top, m.
-        type: kind of tower, see ``scene.towers.KINDS``.
-    """
-
-    id: int
-    x: float
-    y: float
-    base: float
-    height: float
-    type: str
 
 
 @dataclass(frozen=True)
@@ -104,6 +86,35 @@ class Corridor:
             support = self.line.support(number)
             x, y = support.x + self._origin[0], support.y + self._origin[1]
             found.append(TrueTower(number, x, y, support.base, support.height, type=support.kind))
+        return found
+
+    @property
+    def conductors(self) -> list[TrueConductor]:
+        """The true conductors and earth wires, span by span along the line.
+
+        Those before the first and after the last tower leave the survey.
+        """
+        settings, found = self.settings, []
+        n_conductors = 3 * settings.circuits
+        for number in range(len(self)):
+            supports = self.line.support(number), self.line.support(number + 1)
+            ends = (
+                middles(tower.attachments, tower.azimuth, settings.bundle, n_conductors)
+                + self._origin
+                for tower in supports
+            )
+            for place, (start, end) in enumerate(zip(*ends, strict=True)):
+                is_earth = place >= n_conductors
+                found.append(
+                    TrueConductor(
+                        from_tower=number,
+                        to_tower=number + 1 if number < settings.towers else 0,
+                        place=place,
+                        is_earth_wire=is_earth,
+                        subconductors=1 if is_earth else settings.bundle,
+                        catenary=Catenary.of(start, end, settings.catenary),
+                    )
+                )
         return found
 
     def __iter__(self) -> Iterator[Stretch]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from scenenet.line.catenary import Catenary
 from scenenet.synthetic.codes import CONDUCTOR, TALL
 from scenenet.synthetic.returns.flight import Flight
 from scenenet.synthetic.scene.line import Support
@@ -16,22 +17,6 @@ BUNDLE_M = 0.4
 
 CABLE_SAG = 0.02
 """Sag of the cables of other lines as a share of their span."""
-
-
-def catenary(start: np.ndarray, end: np.ndarray, parameter: float, u: np.ndarray) -> np.ndarray:
-    """Points (N, 3) of a conductor that hangs between ``start`` and ``end`` (3,), at shares ``u``
-    (N,) of the horizontal distance.
-
-    z = c cosh((s - s0) / c) + k with the catenary parameter c = tension / weight per metre (m);
-    s0 and k follow from the two ends, which may have different heights.
-    """
-    step = end - start
-    length = float(np.hypot(step[0], step[1]))
-    half = length / (2 * parameter)
-    lowest = length / 2 - parameter * np.arcsinh(step[2] / (2 * parameter * np.sinh(half)))
-    s = u * length
-    z = parameter * (np.cosh((s - lowest) / parameter) - np.cosh(lowest / parameter))
-    return np.column_stack((start[0] + u * step[0], start[1] + u * step[1], start[2] + z))
 
 
 def string_conductors(
@@ -59,7 +44,7 @@ def string_conductors(
         at = at[rng.random(len(at)) < share]
         at = at + 0.2 * step * rng.standard_normal(len(at))
         u = np.clip(at / length, *window)
-        points.append(catenary(start, end, parameter, u))
+        points.append(Catenary.of(start, end, parameter).at_shares(u))
     return np.concatenate(points)
 
 
@@ -80,6 +65,15 @@ def bundled(attachments: np.ndarray, azimuth: float, bundle: int, conductors: in
         for attachment in attachments[:conductors] for across, down in places
     ]  # fmt: skip
     return np.array([*ends, *attachments[conductors:]])
+
+
+def middles(attachments: np.ndarray, azimuth: float, bundle: int, conductors: int) -> np.ndarray:
+    """(W, 3) m, the middle between the highest, lowest, leftmost and rightmost ends of each bundle
+    of ``bundled``."""
+    ends = bundled(attachments, azimuth, bundle, conductors)
+    bundles = ends[: conductors * bundle].reshape(conductors, bundle, 3)
+    middle = (bundles.min(axis=1) + bundles.max(axis=1)) / 2
+    return np.concatenate((middle, ends[conductors * bundle :]))
 
 
 def conductor_points(

@@ -1,0 +1,1 @@
+"""The line between the towers: conductors, spans and clearances."""

@@ -1,0 +1,136 @@
+"""Fit a catenary to points, robustly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.line.catenary import TAUT_M, Catenary
+
+SHORTEST_PARAMETER_M = 60.0
+"""m, least catenary parameter of a wire of a power line; a slack jumper has less."""
+
+NOISE_M = 0.03
+"""m, least spread of points about a wire: what a survey scanner measures to."""
+
+TUKEY = 4.685
+"""Robust standard deviations from which a residual has no weight (Tukey's biweight, 95 % as
+efficient as least squares for normal errors)."""
+
+RAYLEIGH_MEDIAN = 1.177
+"""Median distance from a wire over the standard deviation to one side, for normal errors."""
+
+ITERATIONS, CHANGE = 15, 1e-3
+"""Iterations at most, and change of a weight at which they end."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of the curvature of a wire before it is fitted: that of its neighbours, which
+    hang at about the same tension.
+
+    Attributes:
+        curvature: 1 / c, 1/m.
+        spread: 1/m, its standard deviation.
+    """
+
+    curvature: float
+    spread: float
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A catenary and how well points agree with it.
+
+    Attributes:
+        catenary: between the first and the last point.
+        weights: (n,) in [0, 1], of the points; 0 for outliers.
+        rmse: m, root mean square distance of the points with a weight from the curve.
+    """
+
+    catenary: Catenary
+    weights: np.ndarray
+    rmse: float
+
+
+def fit_catenary(
+    stz: np.ndarray, start: np.ndarray, prior: Prior | None = None, width: float = 0.3
+) -> Fit | None:
+    """Fit a catenary by iteratively reweighted least squares.
+
+    Args:
+        stz: (n, 3) m, points along, beside and above, in any frame with level s and t in which the
+            wire runs along s.
+        start: (n,) in [0, 1], weights of the points to begin with.
+        prior: of the curvature; None for none.
+        width: m, distance from which a point is an outlier, whatever the spread.
+
+    Returns:
+        The fit in the same frame, or None if the points do not say where the wire is.
+    """
+    s, t, z = stz.T
+    weights = start.astype(float)
+    curvature = 0.0 if prior is None else prior.curvature
+    for _ in range(ITERATIONS):
+        used = weights > 0
+        if used.sum() < 4:
+            return None
+        low, high = float(s[used].min()), float(s[used].max())
+        length = high - low
+        if length <= 0:
+            return None
+        u = (s - low) / length
+        beside = _solve(np.column_stack((1 - u, u)), t, weights)
+        stretch = np.hypot(1.0, (beside[1] - beside[0]) / length)  # per metre along s
+        span = length * stretch
+        # z is nearly linear in the heights of the ends and 1 / c: a parabola, and a small rest
+        # that the last curvature gives.
+        bow = span**2 / 2 * u * (1 - u)
+        rest = _above_parabola(u, span, curvature)
+        basis = np.column_stack((1 - u, u, -bow))
+        known = None if prior is None else (prior.curvature, NOISE_M / prior.spread)
+        first, last, curvature = _solve(basis, z - rest, weights, known)
+        curvature = float(np.clip(curvature, 1 / TAUT_M, 1 / SHORTEST_PARAMETER_M))
+        catenary = Catenary(
+            (low, float(beside[0]), float(first)), (high, float(beside[1]), float(last)),
+            1 / curvature,
+        )  # fmt: skip
+        right, above = catenary.residuals(stz)
+        distance = np.hypot(right, above)
+        spread = max(NOISE_M, float(np.median(distance[used])) / RAYLEIGH_MEDIAN)
+        scale = min(TUKEY * spread, width)
+        before, weights = weights, np.where(
+            distance < scale, (1 - (distance / scale) ** 2) ** 2, 0.0
+        )
+        if np.abs(weights - before).max() < CHANGE:
+            break
+    used = weights > 0
+    if used.sum() < 4:
+        return None
+    along, _ = catenary.along(stz)
+    ends = catenary.between(float(along[used].min()), float(along[used].max()))
+    return Fit(ends, weights, float(np.sqrt(np.mean(distance[used] ** 2))))
+
+
+def _above_parabola(u: np.ndarray, span: float, curvature: float) -> np.ndarray:
+    """(n,) m, how far a level catenary is above its parabola, at shares u (n,) of the span."""
+    c = 1 / max(curvature, 1 / TAUT_M)
+    level = Catenary((0.0, 0.0, 0.0), (span, 0.0, 0.0), c)
+    return level.height(u * span) + curvature * span**2 / 2 * u * (1 - u)
+
+
+def _solve(
+    basis: np.ndarray,
+    values: np.ndarray,
+    weights: np.ndarray,
+    known: tuple[float, float] | None = None,
+) -> np.ndarray:
+    """(k,) coefficients by weighted least squares; ``known`` is a value of the last one and the
+    weight of it."""
+    normal = basis.T @ (basis * weights[:, None])
+    right = basis.T @ (values * weights)
+    if known is not None:
+        normal[-1, -1] += known[1] ** 2
+        right[-1] += known[0] * known[1] ** 2
+    return np.linalg.lstsq(normal, right, rcond=None)[0]

@@ -1,0 +1,129 @@
+"""Towers and wires as the search for spans knows them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.line.catenary import Catenary
+from scenenet.line.frame import SpanFrame
+from scenenet.line.trace import Wire, trace_wires
+from scenenet.line.wire_points import WirePoints
+
+REACH_M = 16.0
+"""m, distance from the axis of a tower up to which wires are attached to it: the crossarms of the
+widest pylons of single lines."""
+
+LOWEST_M, ABOVE_TOP_M = 3.0, 3.0
+"""m above the foot of a tower at which a wire is attached at least, and above its top at most: the
+measured top may be that of the body."""
+
+BELOW_M, ABOVE_M = 6.0, 15.0
+"""m below and above a wire in which points that are not certain may be on the other wires of its
+span."""
+
+MIN_POINTS = 12
+"""Points of a wire, at least."""
+
+WORST_M = 0.12
+"""m, greatest root mean square distance of the points of a wire from its catenary. Leaves within
+the tube of a wire are about 0.17 m from it; a scanner measures to 0.05 m."""
+
+TAUTEST_M, LONG_M = 10_000.0, 150.0
+"""m, greatest catenary parameter of a wire of this length or more: what its strength allows. The
+curvature of a shorter one is not known well enough to say."""
+
+
+@dataclass(frozen=True)
+class LineTower:
+    """What the line knows of a tower.
+
+    Attributes:
+        id: in the tower list.
+        x, y, base: m, its foot.
+        height: m.
+    """
+
+    id: int
+    x: float
+    y: float
+    base: float
+    height: float
+
+    @property
+    def place(self) -> np.ndarray:
+        """(2,) m."""
+        return np.array([self.x, self.y])
+
+    def holds(self, z: float) -> bool:
+        """Whether a wire at an elevation in m can be attached to it."""
+        return self.base + LOWEST_M <= z <= self.base + self.height + ABOVE_TOP_M
+
+
+@dataclass(frozen=True)
+class HungWire:
+    """A wire of a span.
+
+    Attributes:
+        catenary: m, between its attachments; at an end without a tower, to its last point.
+        rmse: m, of its points.
+        rows: rows of its points in ``WirePoints``.
+        covered: share of its length on which it is seen.
+        subconductors: wires of its bundle.
+    """
+
+    catenary: Catenary
+    rmse: float
+    rows: np.ndarray
+    covered: float
+    subconductors: int
+
+
+@dataclass(frozen=True)
+class TracedSpan:
+    """Wires between the same two places.
+
+    Attributes:
+        start, end: the towers; None where the wires end in the air.
+        frame: from start to end.
+        wires: in the order in which they were found.
+    """
+
+    start: LineTower | None
+    end: LineTower | None
+    frame: SpanFrame
+    wires: tuple[HungWire, ...]
+
+
+def traced(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> Iterator[HungWire]:
+    """The wires among some points, each between its first and its last point. Points that are not
+    certain count where other wires of the span show that wires hang there.
+
+    Args:
+        rows: (n,) of the points.
+        frame: of the span.
+    """
+    certain = points.certain[rows]
+    stz = frame.to_frame(points.xyz[rows])
+    wires = trace_wires(stz[certain])
+    number = np.flatnonzero(certain)
+    if wires and not certain.all():
+        above = np.array([wire.fit.catenary.residuals(stz)[1] for wire in wires])
+        doubtful = ~certain & (above.max(axis=0) > -BELOW_M) & (above.min(axis=0) < ABOVE_M)
+        number = np.flatnonzero(certain | doubtful)
+        wires = trace_wires(stz[number])
+    for wire in wires:
+        catenary = wire.fit.catenary
+        taut = catenary.parameter > TAUTEST_M and catenary.length > LONG_M
+        if len(wire.rows) >= MIN_POINTS and wire.fit.rmse <= WORST_M and not taut:
+            yield _hung(wire, rows[number[wire.rows]], frame)
+
+
+def _hung(wire: Wire, rows: np.ndarray, frame: SpanFrame) -> HungWire:
+    """The wire in map coordinates."""
+    catenary = wire.fit.catenary
+    start, end = frame.to_map(np.array([catenary.start, catenary.end]))
+    on_map = Catenary.of(start, end, catenary.parameter)
+    return HungWire(on_map, wire.fit.rmse, rows, wire.covered, wire.bundle)

@@ -1,0 +1,155 @@
+"""Wires without a tower at both ends: they leave the survey, lead to a tower that was not found, or
+belong to another line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scenenet.line.catenary import Catenary
+from scenenet.line.frame import SpanFrame
+from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
+from scenenet.line.wire_points import WirePoints
+
+MIN_ALONE_M = 25.0
+"""m, length of a wire without two towers, at least."""
+
+WORST_ALONE_M = 0.08
+"""m, greatest root mean square distance of its points from its catenary."""
+
+SEEN_ALONE = 0.75
+"""Share of its length on which it must be seen."""
+
+UNSEEN_M, PAST_M = 40.0, 6.0
+"""m from the end of a wire to the tower that it leads to, at most, and m that it may reach past
+the axis of the tower."""
+
+LINKED_M, GAP_M = 8.0, 40.0
+"""m, gap in a wire that is bridged before it is known where it leads, and after."""
+
+LOOKED_AT_M = 4.0
+"""m from the axis of a stretch in which all points were looked at."""
+
+
+def lone_spans(
+    points: WirePoints, free: np.ndarray, towers: Sequence[LineTower]
+) -> list[TracedSpan]:
+    """Spans that end in the air, at one end or at both."""
+    found: list[TracedSpan] = []
+    left = free & points.certain
+    while True:
+        frame = _straightest(points.xyz, left)
+        if frame is None:
+            return found
+        rows = points.beside(frame, REACH_M, beyond=REACH_M)
+        rows = rows[free[rows] & points.certain[rows]]
+        wires = [
+            wire
+            for wire in traced(points, rows, frame)
+            if wire.catenary.length >= MIN_ALONE_M
+            and wire.rmse <= WORST_ALONE_M
+            and wire.covered >= SEEN_ALONE
+        ]
+        for wire in wires:
+            left[wire.rows] = free[wire.rows] = False
+        # What is near the axis and on no wire is looked at once.
+        near = points.beside(frame, LOOKED_AT_M)
+        left[near] = False
+        found += _by_towers(wires, towers)
+
+
+def _straightest(xyz: np.ndarray, left: np.ndarray) -> SpanFrame | None:
+    """The longest straight stretch in plan among the points that are left, or None if none is
+    ``MIN_ALONE_M`` long. ``left`` loses points that belong to no stretch."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    while left.any():
+        rows = np.flatnonzero(left)
+        cells, of = np.unique(np.floor(xyz[rows, :2]).astype(np.int64), axis=0, return_inverse=True)
+        pairs = cKDTree(cells).query_pairs(LINKED_M, output_type="ndarray")
+        links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(cells),) * 2)
+        label = connected_components(links, directed=False)[1]
+        sizes = np.bincount(label)
+        small = sizes < MIN_ALONE_M / 4
+        left[rows[small[label[of.ravel()]]]] = False
+        if small.all():
+            return None
+        largest = int(np.argmax(sizes))
+        frame = _axis(cells[label == largest] + 0.5)
+        if frame is not None:
+            return frame
+        left[rows[label[of.ravel()] == largest]] = False
+    return None
+
+
+def _axis(places: np.ndarray) -> SpanFrame | None:
+    """The straight line with most of the places (n, 2) m, in cells of a metre, within 1.5 m."""
+    middle = places.mean(axis=0)
+    best, most = None, 0
+    for angle in np.arange(0.0, np.pi, np.pi / 180):
+        direction = np.array([np.cos(angle), np.sin(angle)])
+        east, north = (places - middle).T
+        t = north * direction[0] - east * direction[1]
+        lanes, counts = np.unique(np.floor(t / 3.0), return_counts=True)
+        if counts.max() > most:
+            most = int(counts.max())
+            best = direction, (lanes[np.argmax(counts)] + 0.5) * 3.0
+    assert best is not None
+    direction, across = best
+    east, north = (places - middle).T
+    near = np.abs(north * direction[0] - east * direction[1] - across) <= 3.0
+    s = np.sort((places[near] - middle) @ direction)
+    breaks = np.flatnonzero(np.diff(s) > GAP_M)
+    starts, stops = np.append(0, breaks + 1), np.append(breaks, len(s) - 1)
+    run = int(np.argmax(s[stops] - s[starts]))
+    low, high = s[starts[run]], s[stops[run]]
+    if high - low < MIN_ALONE_M:
+        return None
+    on_axis = middle + across * np.array([-direction[1], direction[0]])
+    start = on_axis + low * direction
+    return SpanFrame(float(start[0]), float(start[1]), direction, float(high - low))
+
+
+def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[TracedSpan]:
+    """The wires of a stretch by the towers at their ends."""
+    groups: dict[tuple[int, int], list[tuple[HungWire, LineTower | None, LineTower | None]]] = {}
+    for wire in wires:
+        catenary = wire.catenary
+        first = _tower_at(catenary, towers, at_end=False)
+        last = _tower_at(catenary, towers, at_end=True)
+        if first is not None and first is last:
+            first = last = None
+        reach = [0.0, catenary.length]
+        for number, tower in enumerate((first, last)):
+            if tower is not None:
+                reach[number] = float(catenary.along(tower.place[None])[0][0])
+        wire = replace(wire, catenary=catenary.between(*reach))
+        key = (0 if first is None else first.id, 0 if last is None else last.id)
+        groups.setdefault(key, []).append((wire, first, last))
+    spans = []
+    for members in groups.values():
+        _, first, last = members[0]
+        longest = max((wire.catenary for wire, _, _ in members), key=lambda c: c.length)
+        start = longest.start[:2] if first is None else first.place
+        end = longest.end[:2] if last is None else last.place
+        frame = SpanFrame.between(np.array(start), np.array(end))
+        spans.append(TracedSpan(first, last, frame, tuple(wire for wire, _, _ in members)))
+    return spans
+
+
+def _tower_at(
+    catenary: Catenary, towers: Sequence[LineTower], *, at_end: bool
+) -> LineTower | None:
+    """The nearest tower that can hold a wire at one of its ends."""
+    nearest, least = None, UNSEEN_M
+    for tower in towers:
+        s, t = (float(value[0]) for value in catenary.along(tower.place[None]))
+        beyond = s - catenary.length if at_end else -s
+        if -PAST_M <= beyond <= least and abs(t) <= REACH_M:
+            if tower.holds(float(catenary.height(np.array([s]))[0])):
+                nearest, least = tower, max(beyond, 0.0)
+    return nearest

@@ -1,0 +1,94 @@
+"""The spans of a line: wires between two towers, or from a tower into the air."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scenenet.core.progress import track
+from scenenet.line.frame import SpanFrame
+from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
+from scenenet.line.lone_wires import lone_spans
+from scenenet.line.wire_points import WirePoints
+
+LONGEST_M = 1200.0
+"""m, longest span that is looked for. Spans over valleys and rivers are the longest ones."""
+
+SHORTEST_M = 4.0
+"""m; towers closer to one another are poles of one support."""
+
+FOLLOWED = 0.4
+"""Share of the way between two towers with a wire point, from which a span is looked for there."""
+
+BETWEEN_M = 6.0
+"""m, distance from the axis of a span up to which a tower divides it."""
+
+UNSEEN_M, UNSEEN_SHARE = 40.0, 0.35
+"""m, and share of a span, that may be hidden between the first point of a wire and its tower; the
+greater of both."""
+
+
+def find_spans(
+    points: WirePoints, towers: Sequence[LineTower], progress: str | None = None
+) -> list[TracedSpan]:
+    """All spans, those between two towers first.
+
+    Args:
+        progress: label of the progress on stderr; None shows no progress.
+    """
+    free = np.ones(len(points), bool)
+    found = []
+    pairs = list(_pairs(points, towers))
+    for first, last in pairs if progress is None else track(pairs, progress):
+        frame = SpanFrame.between(first.place, last.place)
+        rows = points.beside(frame, REACH_M)
+        wires = tuple(_between(traced(points, rows[free[rows]], frame), frame, first, last))
+        if wires:
+            for wire in wires:
+                free[wire.rows] = False
+            found.append(TracedSpan(first, last, frame, wires))
+    return found + lone_spans(points, free, towers)
+
+
+def _pairs(
+    points: WirePoints, towers: Sequence[LineTower]
+) -> Iterator[tuple[LineTower, LineTower]]:
+    """Pairs of towers with wire points on the way and no tower between, the nearest first."""
+    from scipy.spatial import cKDTree
+
+    if len(towers) < 2:
+        return
+    places = np.array([tower.place for tower in towers])
+    pairs = cKDTree(places).query_pairs(LONGEST_M, output_type="ndarray")
+    apart = np.hypot(*(places[pairs[:, 0]] - places[pairs[:, 1]]).T)
+    for pair in pairs[np.lexsort((pairs[:, 1], pairs[:, 0], np.round(apart, 3)))]:
+        first, last = sorted((towers[i] for i in pair), key=lambda tower: (tower.x, tower.y))
+        frame = SpanFrame.between(first.place, last.place)
+        if frame.length <= SHORTEST_M:
+            continue
+        s, t, _ = frame.to_frame(np.column_stack((places, np.zeros(len(places))))).T
+        between = (np.abs(t) <= BETWEEN_M) & (s > BETWEEN_M) & (s < frame.length - BETWEEN_M)
+        if not between.any() and points.followed(frame, REACH_M / 2) >= FOLLOWED:
+            yield first, last
+
+
+def _between(
+    wires: Iterator[HungWire], frame: SpanFrame, first: LineTower, last: LineTower
+) -> Iterator[HungWire]:
+    """The wires that two towers hold, from the one to the other."""
+    hidden = max(UNSEEN_M, UNSEEN_SHARE * frame.length)
+    for wire in wires:
+        catenary = wire.catenary
+        (start, beside), (end, beside_end) = (
+            (float(value[0]) for value in catenary.along(tower.place[None]))
+            for tower in (first, last)
+        )
+        if -start > hidden or end - catenary.length > hidden:
+            continue
+        if max(abs(beside), abs(beside_end)) > REACH_M:
+            continue
+        ends = catenary.between(start, end)
+        if first.holds(ends.start[2]) and last.holds(ends.end[2]):
+            yield replace(wire, catenary=ends)

@@ -1,0 +1,213 @@
+"""Trace the wires of a span: catenaries through pieces that continue one another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenenet.line.bundles import subconductors
+from scenenet.line.catenary import Catenary
+from scenenet.line.fit import SHORTEST_PARAMETER_M, Fit, Prior, fit_catenary
+from scenenet.line.pieces import APART_M, WINDOW_M, Pieces, find_pieces
+
+ON_WIRE_M = 0.35
+"""m, distance up to which a piece agrees with a wire: half a bundle, and the error of a piece."""
+
+IN_BUNDLE_M = 0.6
+"""m, distance up to which points belong to a wire: the diagonal of a bundle of four."""
+
+SLOPE = 0.06
+"""Difference of slopes up to which a piece agrees with a wire: the error of a piece of 5 m."""
+
+SIDEWAYS = 0.25
+"""Greatest change of t per metre along the span of its wires: 4 m more reach over 16 m."""
+
+MIN_WINDOWS = 3
+"""Windows in which a wire has a piece, at least."""
+
+MIN_COVERED = 0.3
+"""Share of the windows between the ends of a wire that have a piece of it, at least."""
+
+PRIOR_SPREAD = 0.15
+"""Standard deviation of the curvature of wires of a span, as a share of their median."""
+
+MOST_GUESSES = 6000
+"""Guesses that are compared at once."""
+
+FAR_M = 80.0
+"""m, distance of two pieces from which a guess is as good as one from pieces further apart."""
+
+@dataclass(frozen=True)
+class Wire:
+    """A wire in the frame of a span.
+
+    Attributes:
+        fit: the catenary, between the first and the last point.
+        rows: rows of its points.
+        covered: share of the windows between its ends in which it has points.
+        bundle: number of its subconductors; the catenary is that of their middle.
+    """
+
+    fit: Fit
+    rows: np.ndarray
+    covered: float
+    bundle: int = 1
+
+
+def trace_wires(stz: np.ndarray, limit: int = 80) -> list[Wire]:
+    """The wires among points (n, 3) m in the frame of a span, the longest first.
+
+    Args:
+        limit: wires, at most.
+    """
+    pieces = find_pieces(stz)
+    left = np.ones(len(pieces), bool)
+    free = np.ones(len(stz), bool)
+    found: list[Wire] = []
+    guesses = _Guesses(pieces, left)
+    while len(found) < limit:
+        support = guesses.best(left)
+        if support is None:
+            if not guesses.cut:
+                break
+            guesses = _Guesses(pieces, left)
+            continue
+        left[support] = False
+        rows = np.unique(np.concatenate([pieces.members[number] for number in support]))
+        rows = rows[free[rows]]
+        fit = fit_catenary(stz[rows], np.ones(len(rows)), _prior(found))
+        wire = None if fit is None else _supported(stz, fit, free)
+        if wire is None:
+            continue
+        # Pieces beside a wire are of its bundle or its noise.
+        left[_near(pieces, wire.fit.catenary, APART_M)] = False
+        free[wire.rows] = False
+        found.append(wire)
+    return found
+
+
+class _Guesses:
+    """Parabolas through two pieces each, and the pieces that agree with them.
+
+    Attributes:
+        cut: whether there were more of them than are kept.
+    """
+
+    def __init__(self, pieces: Pieces, left: np.ndarray) -> None:
+        """Guess from the pieces that are ``left`` (P,)."""
+        self._pieces = pieces
+        self._numbers = numbers = np.flatnonzero(left)
+        s, t, z = pieces.middle[numbers].T
+        ts, zs = pieces.slopes[numbers].T
+        weight = pieces.weight[numbers]
+        i, j = np.nonzero(s[None, :] - s[:, None] >= 2 * WINDOW_M)
+        ds = s[j] - s[i]
+        sideways, curvature = (t[j] - t[i]) / ds, (zs[j] - zs[i]) / ds
+        # The chord of a parabola is as steep as the mean of its ends.
+        chord = (z[j] - z[i]) / ds - (zs[i] + zs[j]) / 2
+        good = np.abs(chord) <= SLOPE / 2
+        good &= np.abs(sideways) <= SIDEWAYS
+        good &= (np.abs(sideways - ts[i]) <= SLOPE) & (np.abs(sideways - ts[j]) <= SLOPE)
+        # The slopes of two pieces give a curvature with an error, which the chord does not have.
+        error = SLOPE / ds
+        good &= (curvature >= -error) & (curvature <= 1 / SHORTEST_PARAMETER_M + error)
+        kept = np.flatnonzero(good)
+        self.cut = len(kept) > MOST_GUESSES
+        if self.cut:
+            worth = (weight[i] + weight[j])[kept] * np.minimum(ds[kept], FAR_M)
+            kept = np.sort(kept[np.argsort(-worth, kind="stable")[:MOST_GUESSES]])
+        i, j, ds, sideways, curvature = (c[kept] for c in (i, j, ds, sideways, curvature))
+        from_i = s[None, :] - s[i, None]
+        across = t[i, None] + sideways[:, None] * from_i
+        rise = (z[j] - z[i]) / ds - curvature * ds / 2
+        up = z[i, None] + (rise[:, None] + curvature[:, None] / 2 * from_i) * from_i
+        steep = rise[:, None] + curvature[:, None] * from_i
+        self._on = np.hypot(t - across, z - up) <= ON_WIRE_M
+        self._on &= np.abs(zs - steep) <= SLOPE
+        self._on &= np.abs(ts - sideways[:, None]) <= SLOPE
+        self._seen = self._on.astype(np.float32)
+
+    def best(self, left: np.ndarray) -> np.ndarray | None:
+        """Numbers of the pieces that are ``left`` (P,) of the wire with most of them by length;
+        None if none has ``MIN_WINDOWS``."""
+        if len(self._on) == 0:
+            return None
+        free = left[self._numbers]
+        weight = np.where(free, self._pieces.weight[self._numbers], 0.0)
+        best = int(np.argmax(self._seen @ weight.astype(np.float32)))
+        rows = self._numbers[np.flatnonzero(self._on[best] & free)]
+        if len(np.unique(self._pieces.window[rows])) < MIN_WINDOWS:
+            return None
+        return rows
+
+
+def _near(pieces: Pieces, catenary: Catenary, distance: float) -> np.ndarray:
+    """(P,) bool, which pieces lie within a distance in m of a wire."""
+    right, above = catenary.residuals(pieces.middle)
+    along, _ = catenary.along(pieces.middle)
+    inside = (along >= -WINDOW_M) & (along <= catenary.length + WINDOW_M)
+    return inside & (np.hypot(right, above) <= distance)
+
+
+def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray) -> Wire | None:
+    """The wire with all its points and its true ends, or None if too little of it is seen."""
+    catenary = fit.catenary
+    right, above = catenary.residuals(stz)
+    along, _ = catenary.along(stz)
+    on = free & (np.hypot(right, above) <= IN_BUNDLE_M)
+    if not on.any():
+        return None
+    metre = np.floor(along[on] / 2.0).astype(int)
+    seen = np.unique(metre)
+    # Ends: from where the wire is seen without a gap over half a span or 60 m.
+    gaps = np.flatnonzero(np.diff(seen) * 2.0 > 60.0)
+    starts, stops = np.append(0, gaps + 1), np.append(gaps, len(seen) - 1)
+    counts = stops - starts
+    best = int(np.argmax(counts))
+    low, high = seen[starts[best]] * 2.0, seen[stops[best]] * 2.0 + 2.0
+    length = high - low
+    windows = np.unique(np.floor((seen[starts[best] : stops[best] + 1] * 2.0 - low) / (WINDOW_M / 2)))
+    covered = len(windows) / max(np.ceil(length / (WINDOW_M / 2)), 1)
+    if length < 2 * WINDOW_M or covered < MIN_COVERED:
+        return None
+    inside = on & (along >= low) & (along <= high)
+    rows = np.flatnonzero(inside)
+    first, last = along[rows].min(), along[rows].max()
+    return _bundled(stz, rows, catenary.between(first, last), fit, float(covered))
+
+
+def _bundled(
+    stz: np.ndarray, rows: np.ndarray, catenary: Catenary, fit: Fit, covered: float
+) -> Wire:
+    """The wire with its subconductors, if it is a bundle of them.
+
+    Subconductors are parallel, so that their points lie at a few places when they are seen along
+    the wire.
+    """
+    single = Wire(replace(fit, catenary=catenary), rows, covered)
+    # A narrow fit may follow one subconductor, or go from one to another.
+    wide = fit_catenary(stz[rows], np.ones(len(rows)), width=2 * IN_BUNDLE_M)
+    if wide is None:
+        return single
+    catenary = wide.catenary
+    label, places = subconductors(np.column_stack(catenary.residuals(stz[rows])))
+    if len(places) == 1:
+        return single
+    # All points as if they were on one wire in the middle of the bundle.
+    middle = (places.min(axis=0) + places.max(axis=0)) / 2
+    own = label >= 0
+    moved = stz[rows[own]].copy()
+    moved[:, 1:] -= (places[label[own]] - middle) * [catenary.direction[0], 1.0]
+    again = fit_catenary(moved, np.ones(len(moved)))
+    if again is None:
+        return single
+    return Wire(again, rows, covered, len(places))
+
+
+def _prior(found: list[Wire]) -> Prior | None:
+    """Curvature that the wires found so far suggest."""
+    if not found:
+        return None
+    curvature = float(np.median([1 / wire.fit.catenary.parameter for wire in found]))
+    return Prior(curvature, PRIOR_SPREAD * curvature)

@@ -8,10 +8,11 @@ it (``scenenet.prediction.found_towers``).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, get_origin, get_type_hints
+from typing import Any
 
+from scenenet.core.columns import column, columns_of, in_units
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 
@@ -19,49 +20,40 @@ CONTRIBUTION = "contribution_"
 """Start of the name of a column with the contribution of a GENEO."""
 
 
-def _column(
-    unit: str, description: str, *, heading: str | None = None, vertical: bool = False
-) -> Any:
-    facts = {"unit": unit, "description": description, "heading": heading, "vertical": vertical}
-    return field(metadata=facts)
-
-
 @dataclass(frozen=True)
 class SurveyTower:
     """A tower of the tower list. ``TOWER_COLUMNS`` says what each field is."""
 
-    id: int = _column(
+    id: int = column(
         "",
         "number that follows from its place; above 0, and unique in the survey",
         heading="tower",
     )
-    x: float = _column(
-        "m", "easting of the axis of its body, in the CRS of the survey", heading="x"
-    )
-    y: float = _column("m", "northing of the same place", heading="y")
-    height: float = _column(
+    x: float = column("m", "easting of the axis of its body, in the CRS of the survey", heading="x")
+    y: float = column("m", "northing of the same place", heading="y")
+    height: float = column(
         "m", "height of its top above the ground at its axis", heading="height", vertical=True
     )
-    base: float = _column(
+    base: float = column(
         "m", "elevation of the ground at its axis", heading="base elevation", vertical=True
     )
-    width: float = _column(
+    width: float = column(
         "m", "width of its body at half its height, of one pole for a portal", heading="width"
     )
-    conductor_directions: int = _column(
+    conductor_directions: int = column(
         "", "number of directions in which conductors leave it", heading="conductor directions"
     )
-    conductor_bearings: tuple[float, ...] = _column(
+    conductor_bearings: tuple[float, ...] = column(
         "degrees", "bearing of each of these directions, clockwise from north, the longest span "
         "first",
     )  # fmt: skip
-    probability: float = _column("1", "highest probability of its voxels", heading="probability")
-    points: int = _column("", "its own points: body, crossarms and legs", heading="points")
-    edge_distance: float = _column(
+    probability: float = column("1", "highest probability of its voxels", heading="probability")
+    points: int = column("", "its own points: body, crossarms and legs", heading="points")
+    edge_distance: float = column(
         "m", "distance to the edge of the data, at most 50 m",
         heading="distance from the edge of the data",
     )  # fmt: skip
-    contributions: Mapping[str, float] = _column(
+    contributions: Mapping[str, float] = column(
         "1", "mean share of each GENEO in the observer over its detected voxels; positive shares "
         "support a tower, negative ones oppose it",
     )  # fmt: skip
@@ -88,10 +80,7 @@ class SurveyTower:
 
     def in_units(self, sizes: tuple[float, float, float]) -> SurveyTower:
         """The same tower in units of which x, y and z have these sizes in m."""
-        planar, _, vertical = sizes
-        lengths = [column for column in TOWER_COLUMNS if column.unit == "m"]
-        sized = {c.name: c.value(self) / (vertical if c.vertical else planar) for c in lengths}
-        return replace(self, **sized)
+        return in_units(self, sizes)
 
     def to_row(self) -> dict[str, Any]:
         """The tower as a row of plain values, with the columns of ``row_types``: bearings as a
@@ -101,43 +90,7 @@ class SurveyTower:
         return row | {f"{CONTRIBUTION}{name}": share for name, share in self.contributions.items()}
 
 
-@dataclass(frozen=True)
-class TowerColumn:
-    """A column of the tower list.
-
-    Attributes:
-        name: attribute of ``SurveyTower``, and name in files.
-        unit: ``m``, ``degrees``, ``1`` for a ratio, empty for a count or number.
-        description: what it is, for the reference page.
-        heading: name in tables for people, without the unit; None where tables leave it out.
-        vertical: whether its length is along z, whose unit may differ from that of x and y.
-        type: of its values: ``int``, ``float``, ``tuple`` or ``Mapping``.
-    """
-
-    name: str
-    unit: str
-    description: str
-    heading: str | None
-    vertical: bool
-    type: type
-
-    def value(self, tower: SurveyTower) -> Any:
-        """The value of this column for a tower."""
-        return getattr(tower, self.name)
-
-
-_TYPES = get_type_hints(SurveyTower)
-TOWER_COLUMNS = tuple(
-    TowerColumn(
-        name=f.name,
-        unit=f.metadata["unit"],
-        description=f.metadata["description"],
-        heading=f.metadata["heading"],
-        vertical=f.metadata["vertical"],
-        type=get_origin(_TYPES[f.name]) or _TYPES[f.name],
-    )
-    for f in fields(SurveyTower)
-)
+TOWER_COLUMNS = columns_of(SurveyTower)
 """Every column of the tower list, in the order in which files and tables have them."""
 
 

@@ -87,7 +87,8 @@ class Catenary:
 
     def between(self, first: float, last: float) -> Catenary:
         """The same curve between other distances from the start, m."""
-        return Catenary.of(*self.at(np.array([first, last])), self.parameter)
+        start, end = self.at(np.array([first, last]))
+        return Catenary.of(start, end, self.parameter)
 
     @cached_property
     def sag(self) -> float:

@@ -100,8 +100,9 @@ def fit_catenary(
         distance = np.hypot(right, above)
         spread = max(NOISE_M, float(np.median(distance[used])) / RAYLEIGH_MEDIAN)
         scale = min(TUKEY * spread, width)
-        before, weights = weights, np.where(
-            distance < scale, (1 - (distance / scale) ** 2) ** 2, 0.0
+        before, weights = (
+            weights,
+            np.where(distance < scale, (1 - (distance / scale) ** 2) ** 2, 0.0),
         )
         if np.abs(weights - before).max() < CHANGE:
             break

@@ -141,15 +141,13 @@ def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[T
     return spans
 
 
-def _tower_at(
-    catenary: Catenary, towers: Sequence[LineTower], *, at_end: bool
-) -> LineTower | None:
+def _tower_at(catenary: Catenary, towers: Sequence[LineTower], *, at_end: bool) -> LineTower | None:
     """The nearest tower that can hold a wire at one of its ends."""
     nearest, least = None, UNSEEN_M
     for tower in towers:
         s, t = (float(value[0]) for value in catenary.along(tower.place[None]))
         beyond = s - catenary.length if at_end else -s
-        if -PAST_M <= beyond <= least and abs(t) <= REACH_M:
-            if tower.holds(float(catenary.height(np.array([s]))[0])):
-                nearest, least = tower, max(beyond, 0.0)
+        near = -PAST_M <= beyond <= least and abs(t) <= REACH_M
+        if near and tower.holds(float(catenary.height(np.array([s]))[0])):
+            nearest, least = tower, max(beyond, 0.0)
     return nearest

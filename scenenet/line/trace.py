@@ -26,6 +26,9 @@ SIDEWAYS = 0.25
 MIN_WINDOWS = 3
 """Windows in which a wire has a piece, at least."""
 
+STEP_M, GAP_M = 2.0, 60.0
+"""m, steps in which it is looked at where a wire is seen, and longest gap in a wire."""
+
 MIN_COVERED = 0.3
 """Share of the windows between the ends of a wire that have a piece of it, at least."""
 
@@ -37,6 +40,7 @@ MOST_GUESSES = 6000
 
 FAR_M = 80.0
 """m, distance of two pieces from which a guess is as good as one from pieces further apart."""
+
 
 @dataclass(frozen=True)
 class Wire:
@@ -158,18 +162,17 @@ def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray) -> Wire | None:
     on = free & (np.hypot(right, above) <= IN_BUNDLE_M)
     if not on.any():
         return None
-    metre = np.floor(along[on] / 2.0).astype(int)
-    seen = np.unique(metre)
-    # Ends: from where the wire is seen without a gap over half a span or 60 m.
-    gaps = np.flatnonzero(np.diff(seen) * 2.0 > 60.0)
+    # The ends are where the wire is seen without a long gap between.
+    seen = np.unique(np.floor(along[on] / STEP_M)) * STEP_M
+    gaps = np.flatnonzero(np.diff(seen) > GAP_M)
     starts, stops = np.append(0, gaps + 1), np.append(gaps, len(seen) - 1)
-    counts = stops - starts
-    best = int(np.argmax(counts))
-    low, high = seen[starts[best]] * 2.0, seen[stops[best]] * 2.0 + 2.0
-    length = high - low
-    windows = np.unique(np.floor((seen[starts[best] : stops[best] + 1] * 2.0 - low) / (WINDOW_M / 2)))
-    covered = len(windows) / max(np.ceil(length / (WINDOW_M / 2)), 1)
-    if length < 2 * WINDOW_M or covered < MIN_COVERED:
+    longest = int(np.argmax(stops - starts))
+    part = seen[starts[longest] : stops[longest] + 1]
+    low, high = part[0], part[-1] + STEP_M
+    half = WINDOW_M / 2
+    n_seen = len(np.unique(np.floor((part - low) / half)))
+    covered = n_seen / max(np.ceil((high - low) / half), 1)
+    if high - low < 2 * WINDOW_M or covered < MIN_COVERED:
         return None
     inside = on & (along >= low) & (along <= high)
     rows = np.flatnonzero(inside)

@@ -54,14 +54,16 @@ class WirePoints:
         s, t = frame.to_frame(np.column_stack((centres, np.zeros(len(centres)))))[:, :2].T
         near = (np.abs(t) <= reach + CELL_M) & (s >= -beyond - CELL_M)
         near &= s <= frame.length + beyond + CELL_M
-        found = np.sort(np.concatenate([np.empty(0, int), *(rows[c] for c in np.flatnonzero(near))]))
+        found = np.sort(
+            np.concatenate([np.empty(0, int), *(rows[c] for c in np.flatnonzero(near))])
+        )
         s, t = frame.to_frame(self.xyz[found])[:, :2].T
         inside = (np.abs(t) <= reach) & (s >= -beyond) & (s <= frame.length + beyond)
         return found[inside]
 
     def followed(self, frame: SpanFrame, reach: float) -> float:
         """Share of the axis of a frame that has a point within ``reach`` m of it."""
-        centres, _, tree = self._cells
+        _, _, tree = self._cells
         steps = np.arange(CELL_M, frame.length - CELL_M / 2, CELL_M)
         if len(self) == 0 or len(steps) == 0:
             return 0.0

@@ -103,13 +103,13 @@ class Corridor:
                 + self._origin
                 for tower in supports
             )
-            for place, (start, end) in enumerate(zip(*ends, strict=True)):
-                is_earth = place >= n_conductors
+            for number_at, (start, end) in enumerate(zip(*ends, strict=True)):
+                is_earth = number_at >= n_conductors
                 found.append(
                     TrueConductor(
                         from_tower=number,
                         to_tower=number + 1 if number < settings.towers else 0,
-                        place=place,
+                        place=number_at,
                         is_earth_wire=is_earth,
                         subconductors=1 if is_earth else settings.bundle,
                         catenary=Catenary.of(start, end, settings.catenary),

@@ -11,9 +11,10 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from scenenet.core.columns import FieldColumn
 from scenenet.core.files import write_text
 from scenenet.detection.settings import DetectionSettings
-from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower, TowerColumn
+from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower
 from scenenet.interpretability.explanations import TowerExplanation, explanations, meanings
 from scenenet.pointcloud.units import SYMBOLS
 from scenenet.prediction.file_status import SurveyFile
@@ -182,7 +183,7 @@ def _row(tower: SurveyTower, doubtful: bool) -> str:
     )
 
 
-def _text(column: TowerColumn, tower: SurveyTower) -> str:
+def _text(column: FieldColumn, tower: SurveyTower) -> str:
     return f"{column.value(tower):.{DECIMALS[column.unit]}f}"
 
 

@@ -8,8 +8,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import pandas as pd
 
+from scenenet.core.columns import FieldColumn
 from scenenet.core.files import digest
-from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower, TowerColumn
+from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower
 from scenenet.prediction.summary import PredictionSummary
 from scenenet.report.blocks import (
     Block,
@@ -122,7 +123,7 @@ def _tower_list(survey: str, towers: Sequence[SurveyTower]) -> Block:
     return table(frame, columns, caption, source)
 
 
-def _tower_column(column: TowerColumn) -> Column:
+def _tower_column(column: FieldColumn) -> Column:
     heading = str(column.heading) + (" [m]" if column.unit == "m" else "")
     return Column(column.name, heading, TOWER_FORMATS[column.unit])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from scenenet.synthetic.returns.conductors import catenary, string_conductors
+from scenenet.synthetic.returns.conductors import string_conductors
 from scenenet.synthetic.scene.towers import KINDS, Size, place, sample
 from scenenet.synthetic.settings import SyntheticSettings
 
@@ -60,17 +60,6 @@ def test_sampled_points_lie_on_the_members_with_one_density():
 def test_arms_stand_across_the_line():
     east = place(np.array([[1.0, 0.0, 2.0], [0.0, 1.0, 2.0]]), 10, 20, 30, azimuth=0.0)
     np.testing.assert_allclose(east, [[10, 19, 32], [11, 20, 32]], atol=1e-12)
-
-
-@pytest.mark.parametrize("rise", [-20.0, 0.0, 35.0])
-def test_a_conductor_ends_at_its_attachments_and_hangs_below_the_chord(rise):
-    start, end = np.array([5.0, 5.0, 40.0]), np.array([95.0, 125.0, 40.0 + rise])
-    u = np.linspace(0, 1, 101)
-    conductor = catenary(start, end, 1000.0, u)
-    np.testing.assert_allclose(conductor[[0, -1]], [start, end], atol=1e-9)
-    below = (start + u[:, None] * (end - start) - conductor)[:, 2]
-    assert (below[1:-1] > 0).all()
-    assert below.max() == pytest.approx(150**2 / (8 * 1000), rel=0.05)
 
 
 def test_scan_lines_meet_conductors_in_the_scanned_part_only():

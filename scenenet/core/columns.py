@@ -1,0 +1,68 @@
+"""Tables whose columns are the fields of a dataclass: each is declared once, with its unit and
+what it is, and the files, the report and the reference pages follow from that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, TypeVar, get_origin, get_type_hints
+
+Row = TypeVar("Row")
+
+
+def column(
+    unit: str, description: str, *, heading: str | None = None, vertical: bool = False
+) -> Any:
+    """A field that is a column; arguments as the attributes of ``FieldColumn``."""
+    facts = {"unit": unit, "description": description, "heading": heading, "vertical": vertical}
+    return field(metadata=facts)
+
+
+@dataclass(frozen=True)
+class FieldColumn:
+    """A column of a table.
+
+    Attributes:
+        name: attribute of the dataclass, and name in files.
+        unit: ``m``, ``degrees``, ``1`` for a ratio, empty for a count or number.
+        description: what it is, for the reference page.
+        heading: name in tables for people, without the unit; None where tables leave it out.
+        vertical: whether its length is along z, whose unit may differ from that of x and y.
+        type: of its values: ``int``, ``float``, ``str``, ``bool``, ``tuple`` or ``Mapping``.
+    """
+
+    name: str
+    unit: str
+    description: str
+    heading: str | None
+    vertical: bool
+    type: type
+
+    def value(self, row: Any) -> Any:
+        """The value of this column for a row."""
+        return getattr(row, self.name)
+
+
+def columns_of(kind: type) -> tuple[FieldColumn, ...]:
+    """The columns that a dataclass declares with ``column``, in order."""
+    types = get_type_hints(kind)
+    return tuple(
+        FieldColumn(
+            name=f.name,
+            unit=f.metadata["unit"],
+            description=f.metadata["description"],
+            heading=f.metadata["heading"],
+            vertical=f.metadata["vertical"],
+            type=get_origin(types[f.name]) or types[f.name],
+        )
+        for f in fields(kind)
+        if "unit" in f.metadata
+    )
+
+
+def in_units(row: Row, sizes: tuple[float, float, float]) -> Row:
+    """A row whose lengths in m become lengths in units of which x, y and z have ``sizes`` in m."""
+    planar, _, vertical = sizes
+    lengths = [each for each in columns_of(type(row)) if each.unit == "m"]
+    return replace(
+        row, **{c.name: c.value(row) / (vertical if c.vertical else planar) for c in lengths}
+    )  # type: ignore[type-var]

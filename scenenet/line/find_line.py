@@ -1,0 +1,203 @@
+"""Find the lines of a survey: its conductors, its spans in order, and what contradicts them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scenenet.detection.tower_ids import tower_ids
+from scenenet.line.catenary import Catenary
+from scenenet.line.graph import Chain, chains
+from scenenet.line.hung import HungWire, LineTower, TracedSpan
+from scenenet.line.records import Conductor, LineNote, LineSpan, SurveyLine
+from scenenet.line.spans import find_spans
+from scenenet.line.wire_points import WirePoints
+
+PHASES = 3
+"""Conductors of a circuit; what a span has beyond circuits are earth wires, the highest ones."""
+
+MOST_EARTH_WIRES = 2
+
+CABLE_WIRES, CABLE_M = 2, 60.0
+"""Wires without any tower are cables of no line if there are at most so many and they are at most
+so long, m: telephone cables and those to houses."""
+
+BEYOND_M, AROUND_M = 15.0, 5.0
+"""m beyond the end of a wire in the air at which it is asked whether the survey goes on, and how
+far around that place."""
+
+TUBE_M, TUBE_RMSE = 0.25, 3.0
+"""m from its catenary up to which points belong to a wire, at least, and in terms of its RMSE."""
+
+BUNDLE_M = 0.35
+"""m that a bundle reaches from its middle: half the diagonal of four subconductors."""
+
+Seen = Callable[[np.ndarray, float], np.ndarray]
+"""Gives the positions (M, 3) m of what is within a radius in m of a place (2,)."""
+
+
+def find_line(
+    points: WirePoints, towers: Sequence[LineTower], seen: Seen, progress: str | None = None
+) -> SurveyLine:
+    """The lines of a survey.
+
+    Args:
+        points: that may be on wires.
+        towers: the towers found, m.
+        seen: gives what the survey has around a place; it shows where the survey ends.
+        progress: label of the progress on stderr; None shows no progress.
+    """
+    traced = find_spans(points, towers, progress)
+    lines = chains(traced)
+    middles = [span.frame.to_map(np.array([[span.frame.length / 2, 0, 0]]))[0] for span in traced]
+    ids = tower_ids(np.array(middles).reshape(-1, 3)[:, :2])
+    spans: list[LineSpan] = []
+    conductors: list[Conductor] = []
+    notes: list[LineNote] = []
+    number = 0
+    for chain in lines:
+        cable = _is_cable([traced[step.number] for step in chain.steps])
+        number += not cable
+        for order, (step, angle) in enumerate(zip(chain.steps, chain.angles, strict=True), 1):
+            span = _run_through(traced, chain, order - 1)
+            span_id = ids[step.number]
+            own = _conductors(span, span_id, cable=cable)
+            ends, expected = ("cable", []) if cable else _ends(span, seen)
+            notes += [LineNote(*place, "tower expected", 0, span_id) for place in expected]
+            earth = sum(conductor.kind == "earth wire" for conductor in own)
+            spans.append(
+                LineSpan(
+                    start=_place(span, 0), end=_place(span, 1), span_id=span_id,
+                    line=0 if cable else number, order=order,
+                    from_tower=_id(span.start), to_tower=_id(span.end),
+                    length=span.frame.length, angle=angle,
+                    conductors=len(own) - earth, earth_wires=earth,
+                    worst_rmse=max(conductor.rmse for conductor in own), ends=ends,
+                )
+            )  # fmt: skip
+            conductors += own
+    held = {span.from_tower for span in spans} | {span.to_tower for span in spans}
+    notes += [
+        LineNote(tower.x, tower.y, "tower without a conductor", tower.id, 0)
+        for tower in towers
+        if tower.id not in held
+    ]
+    return SurveyLine(tuple(spans), tuple(conductors), tuple(notes))
+
+
+def _is_cable(spans: Sequence[TracedSpan]) -> bool:
+    """Whether wires are those of no line."""
+    return all(
+        span.start is None and span.end is None and len(span.wires) <= CABLE_WIRES
+        and span.frame.length <= CABLE_M
+        for span in spans
+    )  # fmt: skip
+
+
+def _run_through(spans: Sequence[TracedSpan], chain: Chain, index: int) -> TracedSpan:
+    """A span as its line runs through it, with its wires attached in the planes of the crossarms.
+
+    Crossarms halve the angle of the line at their tower.
+    """
+    ways = []
+    for number, turned in chain.steps[max(index - 1, 0) : index + 2]:
+        ways.append(spans[number].frame.direction * (-1 if turned else 1))
+    own = ways[1] if index > 0 else ways[0]
+    before = ways[0] if index > 0 else own
+    after = ways[-1] if index + 1 < len(chain.steps) else own
+    step = chain.steps[index]
+    span = _turned(spans[step.number]) if step.turned else spans[step.number]
+    planes = (span.start, own + before), (span.end, own + after)
+    wires = []
+    for wire in span.wires:
+        reach = [0.0, wire.catenary.length]
+        for end, (tower, along) in enumerate(planes):
+            if tower is not None:
+                away = (tower.place - wire.catenary.start[:2]) @ along
+                reach[end] = float(away / (wire.catenary.direction @ along))
+        wires.append(replace(wire, catenary=wire.catenary.between(*reach)))
+    return replace(span, wires=tuple(wires))
+
+
+def _turned(span: TracedSpan) -> TracedSpan:
+    """The span in the other direction."""
+    frame = span.frame
+    x, y, _ = frame.to_map(np.array([[frame.length, 0.0, 0.0]]))[0].tolist()
+    wires = (
+        replace(wire, catenary=Catenary(w.end, w.start, w.parameter))
+        for wire in span.wires for w in (wire.catenary,)
+    )  # fmt: skip
+    other = replace(frame, x=x, y=y, direction=-frame.direction)
+    return TracedSpan(span.end, span.start, other, tuple(wires))
+
+
+def _conductors(span: TracedSpan, span_id: int, *, cable: bool) -> list[Conductor]:
+    """The conductors of a span, numbered from left to right and from the top."""
+
+    def place(wire: HungWire) -> tuple[float, float]:
+        middle = wire.catenary.at_shares(np.array([0.5]))
+        _, left, z = span.frame.to_frame(middle)[0].tolist()
+        return -round(left, 1), -z
+
+    wires = sorted(span.wires, key=place)
+    earth = set() if cable else _earth_wires(wires)
+    found = []
+    for number, wire in enumerate(wires):
+        curve = wire.catenary
+        kind = "cable" if cable else "earth wire" if number in earth else "conductor"
+        tube = max(TUBE_M, TUBE_RMSE * wire.rmse) + (BUNDLE_M if wire.subconductors > 1 else 0.0)
+        heights = (
+            0.0 if tower is None else z - tower.base
+            for tower, z in ((span.start, curve.start[2]), (span.end, curve.end[2]))
+        )
+        from_height, to_height = heights
+        found.append(
+            Conductor(
+                catenary=curve, tube=tube, span_id=span_id, conductor_id=number + 1, kind=kind,
+                subconductors=wire.subconductors, from_tower=_id(span.start),
+                to_tower=_id(span.end), c=curve.parameter, sag=curve.sag, length=curve.length,
+                rmse=wire.rmse, points=len(wire.rows), seen=wire.covered,
+                from_z=curve.start[2], to_z=curve.end[2],
+                from_height=from_height, to_height=to_height,
+            )
+        )  # fmt: skip
+    return found
+
+
+def _earth_wires(wires: Sequence[HungWire]) -> set[int]:
+    """Numbers of the earth wires: those above full circuits, if they are the highest ones."""
+    over = len(wires) % PHASES
+    if over == 0 or over > MOST_EARTH_WIRES or len(wires) < PHASES:
+        return set()
+    height = [wire.catenary.start[2] + wire.catenary.end[2] for wire in wires]
+    return set(np.argsort(height, kind="stable")[-over:].tolist())
+
+
+def _ends(span: TracedSpan, seen: Seen) -> tuple[str, list[tuple[float, float]]]:
+    """What is known of the ends of a span, and the places (x, y) m at which towers are
+    expected."""
+    expected, leaves = [], False
+    for tower, end, way in ((span.start, 0, -1.0), (span.end, 1, 1.0)):
+        if tower is not None:
+            continue
+        place = np.array(_place(span, end))
+        ahead = place + way * BEYOND_M * span.frame.direction
+        if len(seen(ahead, AROUND_M)):
+            expected.append((float(place[0]), float(place[1])))
+        else:
+            leaves = True
+    if expected:
+        return "tower expected", expected
+    return ("leaves the survey" if leaves else "between towers"), []
+
+
+def _place(span: TracedSpan, end: int) -> tuple[float, float]:
+    """(x, y) m of an end."""
+    x, y, _ = span.frame.to_map(np.array([[end * span.frame.length, 0.0, 0.0]]))[0].tolist()
+    return x, y
+
+
+def _id(tower: LineTower | None) -> int:
+    return 0 if tower is None else tower.id

@@ -1,0 +1,170 @@
+"""What is found of a line: its conductors, spans and expected towers, with the only declaration of
+the columns of their tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Self
+
+from scenenet.core.columns import column, columns_of
+from scenenet.line.catenary import Catenary
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """A conductor or an earth wire of a span. ``CONDUCTOR_COLUMNS`` says what each column is.
+
+    Attributes:
+        catenary: m, between its attachments; at an end without a tower, to its last point.
+        tube: m, distance from the catenary within which points are its points.
+    """
+
+    catenary: Catenary
+    tube: float
+    span_id: int = column("", "number of its span", heading="span")
+    conductor_id: int = column(
+        "", "number in its span, from left to right and then from the top", heading="conductor"
+    )
+    kind: str = column("", "conductor, earth wire, or cable for one of no line", heading="kind")
+    subconductors: int = column("", "number of wires of its bundle", heading="subconductors")
+    from_tower: int = column("", "id of the tower at its start, 0 for none")
+    to_tower: int = column("", "id of the tower at its end, 0 for none")
+    c: float = column(
+        "m", "catenary parameter: horizontal tension over weight per metre", heading="c"
+    )
+    sag: float = column(
+        "m", "greatest vertical distance from the straight line between its ends", heading="sag",
+        vertical=True,
+    )  # fmt: skip
+    length: float = column("m", "horizontal distance between its ends", heading="length")
+    rmse: float = column(
+        "m", "root mean square distance of its points from the catenary", heading="RMSE"
+    )
+    points: int = column("", "number of points that it was fitted to", heading="points")
+    seen: float = column("1", "share of its length on which it has points", heading="seen")
+    from_z: float = column(
+        "m", "elevation of its start: where it is attached, if there is a tower", vertical=True
+    )
+    to_z: float = column("m", "elevation of its end", vertical=True)
+    from_height: float = column(
+        "m", "height of its start above the foot of the tower there; 0 without a tower",
+        vertical=True,
+    )  # fmt: skip
+    to_height: float = column(
+        "m", "height of its end above the foot of the tower there; 0 without a tower",
+        vertical=True,
+    )  # fmt: skip
+
+    def to_json(self) -> dict[str, Any]:
+        own = {c.name: c.value(self) for c in CONDUCTOR_COLUMNS}
+        curve = self.catenary
+        return own | {
+            "tube": self.tube,
+            "catenary": [*curve.start, *curve.end, curve.parameter],
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """What ``to_json`` gave."""
+        x, y, z, far_x, far_y, far_z, parameter = data["catenary"]
+        own = {c.name: data[c.name] for c in CONDUCTOR_COLUMNS}
+        curve = Catenary((x, y, z), (far_x, far_y, far_z), parameter)
+        return cls(catenary=curve, tube=data["tube"], **own)
+
+
+@dataclass(frozen=True)
+class LineSpan:
+    """A span of a line. ``SPAN_COLUMNS`` says what each column is.
+
+    Attributes:
+        start, end: (x, y) m, the feet of its towers, or where its longest conductor ends.
+    """
+
+    start: tuple[float, float]
+    end: tuple[float, float]
+    span_id: int = column("", "number that follows from its place, unique in the survey",
+                          heading="span")  # fmt: skip
+    line: int = column(
+        "", "number of the line that it belongs to; 0 for cables of no line", heading="line"
+    )
+    order: int = column("", "its place along the line, from 1", heading="order")
+    from_tower: int = column("", "id of the tower at its start, 0 for none", heading="from")
+    to_tower: int = column("", "id of the tower at its end, 0 for none", heading="to")
+    length: float = column("m", "horizontal distance between its ends", heading="length")
+    angle: float = column(
+        "degrees", "change of direction of the line at its end, to the right; 0 without a next "
+        "span", heading="angle",
+    )  # fmt: skip
+    conductors: int = column("", "conductors, without earth wires", heading="conductors")
+    earth_wires: int = column("", "earth wires", heading="earth wires")
+    worst_rmse: float = column("m", "largest RMSE of its conductors", heading="worst RMSE")
+    ends: str = column(
+        "", "what is known of its ends: between towers, leaves the survey, or tower expected",
+        heading="ends",
+    )  # fmt: skip
+
+    def to_json(self) -> dict[str, Any]:
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """What ``to_json`` gave."""
+        own = dict(data)
+        own["start"], own["end"] = tuple(own["start"]), tuple(own["end"])
+        return cls(**own)
+
+
+@dataclass(frozen=True)
+class LineNote:
+    """A place that a person should look at. ``NOTE_COLUMNS`` says what each column is."""
+
+    x: float = column("m", "easting", heading="x")
+    y: float = column("m", "northing", heading="y")
+    what: str = column("", "what the line says of the place", heading="what")
+    tower: int = column("", "id of the tower there, 0 for none", heading="tower")
+    span_id: int = column("", "number of the span that says it, 0 for none", heading="span")
+
+    def to_json(self) -> dict[str, Any]:
+        return {c.name: c.value(self) for c in NOTE_COLUMNS}
+
+
+CONDUCTOR_COLUMNS = columns_of(Conductor)
+"""Every column of the list of conductors, in order."""
+
+SPAN_COLUMNS = columns_of(LineSpan)
+"""Every column of the list of spans, in order."""
+
+NOTE_COLUMNS = columns_of(LineNote)
+"""Every column of the list of places to look at, in order."""
+
+
+@dataclass(frozen=True)
+class SurveyLine:
+    """The lines of a survey.
+
+    Attributes:
+        spans: line by line, each in order.
+        conductors: span by span.
+        notes: places to look at: expected towers, and towers without a conductor.
+    """
+
+    spans: tuple[LineSpan, ...]
+    conductors: tuple[Conductor, ...]
+    notes: tuple[LineNote, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        return {
+            "spans": [span.to_json() for span in self.spans],
+            "conductors": [conductor.to_json() for conductor in self.conductors],
+            "notes": [note.to_json() for note in self.notes],
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """What ``to_json`` gave."""
+        return cls(
+            tuple(map(LineSpan.from_json, data["spans"])),
+            tuple(map(Conductor.from_json, data["conductors"])),
+            tuple(LineNote(**note) for note in data["notes"]),
+        )

@@ -22,6 +22,9 @@ ROLES: Mapping[str, Role] = MappingProxyType(
 )
 """Name of a target -> the role of its classes; a new name is added here and nowhere else."""
 
+WIRE = "wire"
+"""Name of the target whose points are traced to conductors."""
+
 LONGEST_NAME = 20
 """Bytes of the name of a target: a dimension of a LAS file has at most 32, and
 ``NAME_probability`` is one."""

@@ -10,6 +10,7 @@ from scenenet.pointcloud.targets import TOWER, Target
 
 PROBABILITY = "tower_probability"
 TOWER_ID = "tower_id"
+SPAN_ID, CONDUCTOR_ID = "span_id", "conductor_id"
 TOWER_CODE = 15
 """Class code of a tower in the schemes asprs and edp."""
 
@@ -33,6 +34,13 @@ def dimensions_of(target: Target, geneos: Iterable[str]) -> dict[str, tuple[type
         dimensions[TOWER_ID] = np.uint32, "id of tower, 0 none"
     shares = {share_of(target, geneo): (np.float32, "share of the response") for geneo in geneos}
     return dimensions | shares
+
+
+LINE_DIMENSIONS: dict[str, tuple[type, str]] = {
+    SPAN_ID: (np.uint32, "number of span, 0 none"),
+    CONDUCTOR_ID: (np.uint16, "conductor in its span"),
+}
+"""The extra dimensions where lines are looked for: name -> (numpy type, description)."""
 
 
 def _described(target: Target) -> str:

@@ -13,6 +13,9 @@ from scenenet.pointcloud import add_dimensions
 from scenenet.pointcloud.targets import TOWER
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.point_dimensions import (
+    CONDUCTOR_ID,
+    LINE_DIMENSIONS,
+    SPAN_ID,
     TOWER_ID,
     dimensions_of,
     probability_of,
@@ -64,6 +67,8 @@ def write_points(
                 named[TOWER_ID] = points.tower_id
             for geneo, share in zip(model.tiles.geneos, predicted.shares.T, strict=True):
                 named[share_of(target, geneo)] = share
+        if points.span_id is not None and points.conductor_id is not None:
+            named |= {SPAN_ID: points.span_id, CONDUCTOR_ID: points.conductor_id}
         return named
 
     def classify(_: Mapping[str, np.ndarray], codes: np.ndarray) -> np.ndarray:
@@ -80,6 +85,8 @@ def write_points(
     dimensions: dict[str, tuple[type, str]] = {}
     for model in models:
         dimensions |= dimensions_of(model.target, model.tiles.geneos)
+    if look_up.has_line:
+        dimensions |= LINE_DIMENSIONS
     reclassify = classify if settings.classify else None
     add_dimensions(file.path, out, dimensions, values, file.state, reclassify, crs)
     tower_points = counts.pop(TOWER.name, 0)

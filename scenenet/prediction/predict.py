@@ -17,7 +17,10 @@ from scenenet.core.outputs import check_space
 from scenenet.core.progress import quiet, track
 from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.detection.settings import DetectionSettings
+from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
+from scenenet.pointcloud.targets import WIRE
+from scenenet.prediction.found_line import find_line_in_survey
 from scenenet.prediction.found_towers import FoundTowers, find_in_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
@@ -97,6 +100,10 @@ def predict_survey(
                 found = find_in_survey(joined.spool, tiles[0], units, tau, detection, label)
                 write_json(folder.towers, found.to_json())
             found = FoundTowers.from_json(read_json(folder.towers))
+        further = [
+            FurtherModel(each, joined.spool_at(each.voxel_size), predicted)
+            for each, predicted in zip(used[1:], tiles[1:], strict=True)
+        ]
         yield SurveyPrediction.of(
             joined,
             tiles[0],
@@ -107,10 +114,8 @@ def predict_survey(
             detection=detection,
             started=started,
             code=first.code,
-            further=[
-                FurtherModel(each, joined.spool_at(each.voxel_size), predicted)
-                for each, predicted in zip(used[1:], tiles[1:], strict=True)
-            ],
+            further=further,
+            line=_line(joined, folder, found, further) if first.target.is_tower else None,
         )
 
 
@@ -157,6 +162,27 @@ def _predict_files(joined: SurveyWork, folder: WorkFolder, used: UsedModel) -> T
 
     _each(joined.used, f"{joined.survey.given.name}: files predicted", predict)
     return TilePredictions(files)
+
+
+def _line(
+    joined: SurveyWork, folder: WorkFolder, found: FoundTowers, further: Sequence[FurtherModel]
+) -> SurveyLine | None:
+    """The lines between the towers of a survey; None without a model of wires."""
+    for model in further:
+        if model.used.target.name == WIRE:
+            if not folder.line.exists():
+                line = find_line_in_survey(
+                    joined.spool,
+                    model.spool,
+                    model.tiles,
+                    model.used.card.threshold(),
+                    found.towers,
+                    joined.system.unit_sizes,
+                    f"{joined.survey.given.name}: spans traced",
+                )
+                write_json(folder.line, line.to_json())
+            return SurveyLine.from_json(read_json(folder.line))
+    return None
 
 
 def _each(items: Sequence[Item], label: str, step: Callable[[Item], None]) -> None:

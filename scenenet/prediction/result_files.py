@@ -36,6 +36,7 @@ class PredictionFiles:
         page: the page of the survey (HTML); None for no page.
         status: a row per file of the survey (CSV); None for a survey that is one file.
         copc: whether each file of the points is also written as COPC (``copc_of``).
+        line_tables: the spans and the conductors (CSV); None where no lines are looked for.
     """
 
     points: Mapping[Path, Path]
@@ -46,10 +47,17 @@ class PredictionFiles:
     page: Path | None = None
     status: Path | None = None
     copc: bool = False
+    line_tables: tuple[Path, Path] | None = None
 
     @classmethod
     def of(
-        cls, survey: SurveyFiles | Path, folder: Path, *, copc: bool = False, towers: bool = True
+        cls,
+        survey: SurveyFiles | Path,
+        folder: Path,
+        *,
+        copc: bool = False,
+        towers: bool = True,
+        line: bool = False,
     ) -> PredictionFiles:
         """The files that the command line writes for a survey. The points of one with several files
         are in a folder with its name, with its status.
@@ -57,6 +65,7 @@ class PredictionFiles:
         Args:
             copc: whether points are also written as COPC.
             towers: whether towers are looked for.
+            line: whether lines are looked for.
         """
         if not isinstance(survey, SurveyFiles):
             survey = SurveyFiles.of(survey)
@@ -75,12 +84,18 @@ class PredictionFiles:
             page=folder / f"{survey.name}.html" if towers else None,
             status=place / "status.csv" if survey.tiled else None,
             copc=copc,
+            line_tables=(
+                (folder / f"{survey.name}.spans.csv", folder / f"{survey.name}.conductors.csv")
+                if line
+                else None
+            ),
         )
 
     @property
     def lists(self) -> tuple[Path, ...]:
         """The tower list in its formats, the page, and the status."""
-        named = (self.geopackage, self.geojson, self.table, self.page, self.status)
+        tables = self.line_tables or ()
+        named = (self.geopackage, self.geojson, self.table, self.page, self.status, *tables)
         return tuple(path for path in named if path is not None)
 
     def outputs(self) -> list[Output]:
@@ -93,11 +108,13 @@ class PredictionFiles:
         return points + lists
 
     def outdated(self) -> list[Path]:
-        """Lists and pages of towers that an earlier prediction wrote and this one does not."""
-        if self.table is not None:
-            return []
+        """Lists and pages that an earlier prediction wrote and this one does not."""
+        endings: tuple[str, ...] = ()
+        if self.table is None:
+            endings += (".towers.geojson", ".towers.csv", ".html")
+        if self.line_tables is None:
+            endings += (".spans.csv", ".conductors.csv")
         name = self.summary.name.removesuffix(SUMMARY)
-        endings = (".towers.geojson", ".towers.csv", ".html")
         paths = (self.summary.with_name(name + ending) for ending in endings)
         return [path for path in paths if path.exists() and self.is_own(path)]
 

@@ -38,6 +38,8 @@ class PredictionSummary:
             later prediction replaces these files only if they are unchanged.
         targets: of each model, that of the attributes above first: its target, name, tau, voxel
             size (m), kernel size (voxels) and the number of points taken for the target.
+        line: numbers of lines, spans, conductors, earth wires, cables and places to look at, and
+            what positions of wires are; None if lines were not looked for.
     """
 
     survey: str
@@ -58,6 +60,7 @@ class PredictionSummary:
     model_provenance: dict[str, Any]
     outputs: dict[str, str]
     targets: list[dict[str, Any]] = field(default_factory=list)
+    line: dict[str, Any] | None = None
 
     def to_json(self) -> dict[str, Any]:
         return asdict(self)
@@ -67,8 +70,8 @@ class PredictionSummary:
         """The summary that ``to_json`` gave.
 
         Raises:
-            KeyError: a value is missing, other than ``targets``, which earlier versions did not
-                write. Values that this version does not know are ignored.
+            KeyError: a value is missing, other than ``targets`` and ``line``, which earlier
+                versions did not write. Values that this version does not know are ignored.
         """
-        known = {"targets": [], **data}
+        known = {"targets": [], "line": None, **data}
         return cls(**{each.name: known[each.name] for each in fields(cls)})

@@ -14,6 +14,7 @@ from scenenet.core.errors import warn
 from scenenet.core.unchanged import FileState
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
+from scenenet.line.records import SurveyLine
 from scenenet.prediction.file_status import SurveyFile, readable
 from scenenet.prediction.found_towers import FoundTowers
 from scenenet.prediction.point_dimensions import TOWER_CODE
@@ -72,6 +73,8 @@ class SurveyPrediction:
         started: ``time.perf_counter()`` at the start.
         code: class code for points taken for the target of the first model (``UsedModel``).
         further: the other models.
+        line: its lines, m; None if they were not looked for: that needs a model of towers and one
+            of wires.
     """
 
     survey: SurveyFiles
@@ -88,6 +91,7 @@ class SurveyPrediction:
     started: float
     code: int | None = TOWER_CODE
     further: tuple[FurtherModel, ...] = ()
+    line: SurveyLine | None = None
 
     @classmethod
     def of(
@@ -103,6 +107,7 @@ class SurveyPrediction:
         started: float,
         code: int | None = TOWER_CODE,
         further: Sequence[FurtherModel] = (),
+        line: SurveyLine | None = None,
     ) -> SurveyPrediction:
         """What was read, predicted and found."""
         return cls(
@@ -120,6 +125,7 @@ class SurveyPrediction:
             started=started,
             code=code,
             further=tuple(further),
+            line=line,
         )
 
     @property
@@ -181,7 +187,7 @@ class SurveyPrediction:
             _target_tiles(each.tiles, each.spool, each.used.card, each.used.code)
             for each in self.further
         ]
-        return PointLookUp(models, self.structures, self.unit_sizes)
+        return PointLookUp(models, self.structures, self.unit_sizes, self.line)
 
     @property
     def finds_towers(self) -> bool:

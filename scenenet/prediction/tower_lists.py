@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import sqlite3
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -104,6 +104,7 @@ def write_geopackage(
     spool: TileSpool,
     files: Sequence[SurveyFile],
     targets: Sequence[str],
+    more: Callable[[Path], Sequence[str]] | None = None,
 ) -> None:
     """Write the tower list as a GeoPackage in the CRS of the survey, with styles for QGIS.
 
@@ -119,6 +120,7 @@ def write_geopackage(
         spool: the occupied voxels of the survey.
         files: of the survey, a row each in the layer ``tiles``.
         targets: names of what was looked for.
+        more: adds further layers to the file, and returns their names.
     """
     import shapely
 
@@ -130,10 +132,10 @@ def write_geopackage(
     attributes = {name: np.array([row[name] for row in facts]) for name in facts[0]}
     if towers is not None:
         write_tower_layer(path, "towers", towers, row_types(geneos), crs)
+    others = () if more is None else more(Path(path))
     write_layer(path, "coverage", "Polygon", parts, {"area_m2": area}, crs)
     write_layer(path, "tiles", "Polygon", extents, attributes, crs)
-    drawn = [layer for layer in STYLES if layer != "towers" or towers is not None]
-    add_styles(path, drawn)
+    add_styles(path, [*(["towers"] if towers is not None else []), *others, "coverage", "tiles"])
 
 
 def coverage(spool: TileSpool) -> Any:

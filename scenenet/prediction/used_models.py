@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.las.extra_dimensions import TEXT_BYTES
-from scenenet.pointcloud.targets import Target
+from scenenet.pointcloud.targets import TOWER, WIRE, Target
 from scenenet.prediction.point_dimensions import TOWER_CODE, dimensions_of
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.tile_predictions import geneo_names
@@ -48,6 +48,12 @@ class UsedModel:
         return self.card.finds
 
 
+def finds_lines(models: Iterable[UsedModel]) -> bool:
+    """Whether lines follow from what the models find: towers and wires."""
+    targets = {used.target.name for used in models}
+    return {TOWER.name, WIRE} <= targets
+
+
 def paths_of(models: ModelPaths) -> list[Path]:
     """The files of one or of several models."""
     return [Path(models)] if isinstance(models, str | Path) else [Path(path) for path in models]
@@ -82,7 +88,7 @@ def use_models(
 def _code(target: Target, scheme: ClassScheme | None) -> int | None:
     if target.is_tower:
         return TOWER_CODE
-    return scheme.main_code("conductor") if scheme and target.name == "wire" else None
+    return scheme.main_code("conductor") if scheme and target.name == WIRE else None
 
 
 def _require_different(models: Iterable[UsedModel]) -> None:

@@ -14,9 +14,16 @@ from scenenet.core.files import atomic, write_json
 from scenenet.core.provenance import fingerprint, package_version
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import row_types
+from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.copc import write_copc
 from scenenet.prediction.file_status import write_status
+from scenenet.prediction.line_lists import (
+    AS_FLOWN,
+    write_conductors_csv,
+    write_line_layers,
+    write_spans_csv,
+)
 from scenenet.prediction.page.survey_page import write_page
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.result_files import PredictionFiles, copc_of
@@ -138,6 +145,11 @@ def _write_lists(
         write_geojson(lists[files.geojson], prediction.towers, crs, sizes)
     if files.table is not None:
         write_csv(lists[files.table], prediction.towers, row_types(prediction.geneos))
+    if files.line_tables is not None and prediction.line is not None:
+        for path, write in zip(
+            files.line_tables, (write_spans_csv, write_conductors_csv), strict=True
+        ):
+            write(lists[path], prediction.line, prediction.unit_sizes)
     if files.page is not None:
         write_page(prediction, lists[files.page])
     if files.status is not None:
@@ -169,15 +181,18 @@ def _made_by(
 
 def write_layers(prediction: SurveyPrediction, geopackage: Path) -> None:
     """Write the layers of the GeoPackage."""
+    line, crs, sizes = prediction.line, prediction.crs, prediction.unit_sizes
+    more = None if line is None else lambda path: write_line_layers(path, line, crs, sizes)
     write_geopackage(
         geopackage,
         prediction.towers if prediction.finds_towers else None,
         prediction.geneos,
-        prediction.crs,
-        prediction.unit_sizes,
+        crs,
+        sizes,
         prediction.spool,
         prediction.files,
         prediction.target_names,
+        more,
     )
 
 
@@ -207,7 +222,22 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         model_provenance=prediction.card.provenance,
         outputs=outputs,
         targets=_targets(prediction),
+        line=None if prediction.line is None else _line(prediction.line),
     )
+
+
+def _line(line: SurveyLine) -> dict[str, Any]:
+    """What ``PredictionSummary.line`` says."""
+    kinds = [conductor.kind for conductor in line.conductors]
+    return {
+        "lines": len({span.line for span in line.spans if span.line}),
+        "spans": sum(span.line > 0 for span in line.spans),
+        "conductors": kinds.count("conductor"),
+        "earth_wires": kinds.count("earth wire"),
+        "cables": kinds.count("cable"),
+        "to_look_at": len(line.notes),
+        "positions": AS_FLOWN,
+    }
 
 
 def _targets(prediction: SurveyPrediction) -> list[dict[str, Any]]:

@@ -23,7 +23,7 @@ from scenenet.cli.options import (
 from scenenet.cli.output import show
 from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme, class_scheme
-from scenenet.pointcloud.targets import Target
+from scenenet.pointcloud.targets import WIRE, Target
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -108,6 +108,11 @@ def command(
     probability, in the units of the survey. GeoJSON is in longitude and latitude where the CRS is
     known.
 
+    NAME.spans.csv, NAME.conductors.csv: with a model of towers and one of wires, the spans in order
+    along each line, and every conductor with its catenary, sag and attachments. NAME.gpkg then has
+    the layers spans, conductors and line_notes, and each point the numbers of its span and
+    conductor. Positions are those of the flight, not those at another temperature, load or wind.
+
     NAME.html: a page with a map, the list of the towers, and each tower in plan and profile with
     its reasons and what to check. It needs no other file and no network.
 
@@ -128,7 +133,7 @@ def command(
     from scenenet.prediction.result_files import PredictionFiles, require_space
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles, look_at
-    from scenenet.prediction.used_models import use_models
+    from scenenet.prediction.used_models import finds_lines, use_models
 
     settings = PredictSettings(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
@@ -139,13 +144,13 @@ def command(
         require_pdal()
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
-    towers = model == [packaged_model()]
+    towers, line = model == [packaged_model()], False
     if named and not towers:  # it loads torch, which takes seconds
         used = use_models(model, settings, scheme)
         _require_codes(used, settings, scheme)
-        towers = used[0].target.is_tower
+        towers, line = used[0].target.is_tower, finds_lines(used)
     files = {
-        given: PredictionFiles.of(survey, out, copc=copc, towers=towers)
+        given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=line)
         for given, survey in named.items()
     }
     outputs = [output for each in files.values() for output in each.outputs()]
@@ -182,6 +187,11 @@ def _line(summary: dict[str, Any]) -> str:
         target = Target.parse(each["target"])
         if not target.is_tower:
             found.append(f"{each['points']:,} {target.name} points")
+    if summary["line"] is not None:
+        wires = summary["line"]
+        found.append(f"{wires['spans']} spans with {wires['conductors']} conductors")
+        if wires["to_look_at"]:
+            found.append(f"{wires['to_look_at']} places to look at (layer line_notes)")
     line = f"{summary['survey']}: {', '.join(found)} among {summary['points']:,} points"
     return line if summary["towers"] is not None else f"{line}; towers were not looked for"
 
@@ -194,7 +204,7 @@ def _require_codes(
     Raises:
         typer.BadParameter: there is a model of wires, and no scheme.
     """
-    if settings.classify and scheme is None and any(each.target.name == "wire" for each in used):
+    if settings.classify and scheme is None and any(each.target.name == WIRE for each in used):
         raise typer.BadParameter(
             "--classify with a model of target wire needs the class scheme of the survey "
             f"({_WIRE_CODES})",

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.targets import TOWER, Target
+from scenenet.prediction.work.conductor_points import ConductorOwners
 from scenenet.prediction.work.structures import Owners, Structures
 from scenenet.prediction.work.survey_system import in_metres
 from scenenet.prediction.work.tile_predictions import TilePredictions
@@ -54,10 +56,14 @@ class PointPredictions:
     Attributes:
         models: of each model, in the order of ``PointLookUp.models``.
         tower_id: (n,) uint32, 0 for no tower.
+        span_id, conductor_id: (n,) uint32 and uint16, the span and the conductor in it that the
+            point lies on, 0 for none; None where no line was looked for.
     """
 
     models: tuple[TargetPredictions, ...]
     tower_id: np.ndarray
+    span_id: np.ndarray | None = None
+    conductor_id: np.ndarray | None = None
 
     @property
     def probability(self) -> np.ndarray:
@@ -75,6 +81,7 @@ class PointLookUp:
 
     Attributes:
         models: the predictions of each model for tiles.
+        has_line: whether it says which conductor a point lies on.
     """
 
     def __init__(
@@ -82,18 +89,23 @@ class PointLookUp:
         models: Sequence[TargetTiles],
         structures: Structures,
         unit_sizes: tuple[float, float, float],
+        line: SurveyLine | None = None,
     ) -> None:
-        """Sort the structures by place.
+        """Sort the structures and the conductors by place.
 
         Args:
             models: at least one.
             structures: all that reach into a tile with a point that will be asked for, found by the
                 first model.
             unit_sizes: sizes in m of the units of x, y and z.
+            line: the lines of the survey; None if none were looked for.
         """
         self.models = tuple(models)
+        self.has_line = line is not None
         self._unit_sizes = unit_sizes
-        self._owners = Owners(structures, self.models[0].lattice)
+        lattice = self.models[0].lattice
+        self._owners = Owners(structures, lattice)
+        self._conductors = None if line is None else ConductorOwners(line.conductors, lattice)
 
     def __call__(self, xyz: np.ndarray) -> PointPredictions:
         """The predictions for points (n, 3) of the survey, in its units."""
@@ -104,7 +116,8 @@ class PointLookUp:
                 located[model.lattice] = model.lattice.locate(xyz)
         found = tuple(_look_up(model.tiles, *located[model.lattice]) for model in self.models)
         codes, _ = located[self.models[0].lattice]
-        return PointPredictions(found, self._owners(xyz, codes))
+        on = (None, None) if self._conductors is None else self._conductors(xyz, codes)
+        return PointPredictions(found, self._owners(xyz, codes), *on)
 
     def taken(self, points: PointPredictions, number: int) -> np.ndarray:
         """(n,) bool, which points are taken for the target of the model with a number: points of

@@ -54,6 +54,11 @@ class WorkFolder:
         return self.folder / "towers.json"
 
     @property
+    def line(self) -> Path:
+        """The lines (``SurveyLine``)."""
+        return self.folder / "line.json"
+
+    @property
     def written(self) -> Path:
         """Name of each file whose points were written -> what the status says about it."""
         return self.folder / "written.json"
@@ -155,7 +160,11 @@ def _keep_what_fits(work: WorkFolder, survey: SurveyFiles, made_by: Mapping[str,
         kept = {out for name, out in reads.items() if name in same and _is_whole(out)}
         if before["files"] == states:
             predicted = (out for name in states for out in work.all_predicted(name))
-            kept |= {out for out in predicted if _is_whole(out)} | {work.towers, work.written}
+            kept |= {out for out in predicted if _is_whole(out)} | {
+                work.towers,
+                work.line,
+                work.written,
+            }
         else:
             print(
                 f"{survey.given}: files have changed since the earlier run was stopped; "

@@ -27,7 +27,8 @@ def orbits(crops: list[PointCloud], repetitions: int = 7) -> dict[str, Any]:
     """Time of each kernel of ``SHAPES`` at the occupied voxels of the first crop.
 
     Returns:
-        by kernel: ours_ms, the maximum over its orbit; one_ms, one kernel of the orbit;
+        by kernel: filled, share of positions that are not zero; ours_ms, the maximum over its
+        orbit; by_position_ms, the same stored by position, whatever is faster; one_ms, one kernel of the orbit;
         one_full_ms, a kernel of the same size without zeros; each_ms, all kernels one after the
         other, extrapolated from one; difference, of the maximum from that of the single kernels.
     """
@@ -45,9 +46,11 @@ def orbits(crops: list[PointCloud], repetitions: int = 7) -> dict[str, Any]:
         numbers = {symbol: torch.tensor(value) for symbol, value in shape.items()}
         kernels = kernel.orbit(lattice, numbers)
         orbit, full = Orbit.of(kernels), torch.rand(kernels[:1].shape)
+        by_position = Orbit.of(kernels, 1.0)
         times = medians(
             {
                 "ours": partial(strongest_at_voxels, occupancy, orbit),
+                "by_position": partial(strongest_at_voxels, occupancy, by_position),
                 "one": partial(convolve_at_voxels, occupancy, kernels[:1]),
                 "one_full": partial(convolve_at_voxels, occupancy, full),
             },
@@ -55,11 +58,13 @@ def orbits(crops: list[PointCloud], repetitions: int = 7) -> dict[str, Any]:
         )
         some = slice(0, len(kernels), max(1, len(kernels) // 8))
         apart = convolve_at_voxels(occupancy, kernels[some]).max(dim=0).values.numpy()
-        ours = strongest_at_voxels(occupancy, Orbit.of(kernels[some]))
+        ours = strongest_at_voxels(occupancy, Orbit.of(kernels[some], 1.0))
         found[name] = {
             "kernels": len(kernels),
             "size": list(lattice.size),
+            "filled": float((kernels != 0).float().mean()),
             "ours_ms": times["ours"],
+            "by_position_ms": times["by_position"],
             "one_ms": times["one"],
             "one_full_ms": times["one_full"],
             "each_ms": times["one"] * len(kernels),

@@ -32,12 +32,14 @@ from scenenet.evaluation.surveys import LabelledSurvey
 from scenenet.evaluation.tune import with_answer
 from scenenet.interpretability.determination import determination
 from scenenet.interpretability.parameter_sentences import parameters_of
+from scenenet.measurement.registry import PRESENCE, measurement_named
 from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import write_model
 from scenenet.models.settings import ModelSettings, TuningSettings
 from scenenet.pointcloud import PointCloud, class_scheme, survey_in_metres
+from scenenet.pointcloud.point_fields import PointField
 from scenenet.pointcloud.quality.screening import survey_warnings
 from scenenet.pointcloud.reading import same_points
 from scenenet.pointcloud.targets import TOWER, Target
@@ -81,6 +83,7 @@ def read_labelled(
     truths: Sequence[Path] = (),
     target: Target = TOWER,
     squares: SquareSettings | None = None,
+    measurement: str = PRESENCE,
 ) -> LabelledFiles:
     """Cut crops around the labelled towers of files, or squares that hold another target, and
     voxelise them.
@@ -95,12 +98,13 @@ def read_labelled(
             classes, or a folder of such samples; empty where the truth is not known.
         target: what is labelled in the voxels.
         squares: size of a crop for another target than towers; the default if None.
+        measurement: phi that is needed of the voxels.
 
     Raises:
         OutputError: the disk of the temporary files has too little space.
     """
     files = LabelledFiles()
-    wanted = _Wanted(codes, grid, target, squares or SquareSettings())
+    wanted = _Wanted(codes, grid, target, squares or SquareSettings(), measurement)
     pairs: list[tuple[Path, Path | None]] = [
         (path, truths[number] if truths else None) for number, path in enumerate(paths)
     ]
@@ -152,6 +156,12 @@ class _Wanted:
     grid: VoxelSettings
     target: Target
     squares: SquareSettings
+    measurement: str
+
+    @property
+    def fields(self) -> tuple[PointField, ...]:
+        """What else is read of each point."""
+        return measurement_named(self.measurement).fields
 
 
 def _read_file(
@@ -173,7 +183,8 @@ def _read_file(
     surveys = cut(path, truth, name, wanted, crops, files)
     warn(path, warnings)
     files.warnings.extend(f"{path}: {text}" for text in warnings)
-    build(crops, wanted.grid, folder / "voxels.zarr.zip", voxels)
+    store = folder / "voxels.zarr.zip"
+    build(crops, wanted.grid, store, voxels, measurement=wanted.measurement)
     files.read.append(path)
     files.surveys.extend(surveys)
     return crops, voxels
@@ -199,7 +210,8 @@ def _cut_towers(
         )
         standing = Truth(truth, true.towers)
     store = crops.with_name("crops.zarr.zip")
-    facts = cut_crops(name, path, codes, found.towers, CropSettings(), store, crops, standing)
+    settings, fields = CropSettings(), wanted.fields
+    facts = cut_crops(name, path, codes, found.towers, settings, store, crops, standing, fields)
     files.skipped.extend(facts["skipped"])
     if not sample_files(path) and len(found.towers) == 0:
         labelled = int(found.left_out["points"].sum())
@@ -219,7 +231,8 @@ def _cut_squares(
 ) -> list[LabelledSurvey]:
     """Cut the squares of a file that hold the target into the manifest ``crops``."""
     codes, target, store = wanted.codes, wanted.target, crops.with_name("crops.zarr.zip")
-    facts = cut_squares(name, path, codes, target, wanted.squares, store, crops, truth)
+    how = wanted.squares, store, crops, truth, wanted.fields
+    facts = cut_squares(name, path, codes, target, *how)
     files.skipped.extend(facts["skipped"])
     cut = [crop_of(entry) for entry in facts["crops"]]
     none = LabelledTowers.none()
@@ -286,7 +299,15 @@ def train_files(
     with scratch_folder() as scratch:
         wanted = split if validation > 0 else None
         files = read_labelled(
-            paths, codes, grid, failures, scratch, wanted, target=target, squares=squares
+            paths,
+            codes,
+            grid,
+            failures,
+            scratch,
+            wanted,
+            target=target,
+            squares=squares,
+            measurement=settings.measurement,
         )
         data = files.dataset
         require_crops(files, paths, failures, target, codes)

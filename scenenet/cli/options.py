@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, get_args
 import typer
 
 from scenenet.core.errors import InputError
-from scenenet.core.provided_kernels import VARIABLE, provide
+from scenenet.core.provided_code import KERNELS, MEASUREMENTS
 from scenenet.dataset import voxels
 from scenenet.models import settings
 from scenenet.models.packaged import packaged_model
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     Fits = StrEnum
     Protocols = StrEnum
     Kinds = StrEnum
+    Mixings = StrEnum
 else:
 
     def _choices(name: str, values: Iterable[str]) -> type[StrEnum]:
@@ -45,6 +46,8 @@ else:
     """Training protocols (``scenenet.models.settings``)."""
     Kinds = _choices("Kinds", _KINDS)
     """Architectures (``scenenet.models.settings``)."""
+    Mixings = _choices("Mixings", get_args(settings.Mixing))
+    """How kernels become one observer (``scenenet.models.settings``)."""
 
 Survey = Annotated[
     Path,
@@ -62,7 +65,7 @@ Surveys = Annotated[
 
 
 def _provide(files: list[Path] | None) -> list[Path] | None:
-    provide(files or ())
+    KERNELS.provide(files or ())
     return files
 
 
@@ -73,10 +76,29 @@ Kernels = Annotated[
         metavar="FILE",
         callback=_provide,
         help="Python file with a kernel, or a folder of them. It is run when a kernel of its name "
-        f"is used. May be repeated; {VARIABLE} adds more, separated as in PATH.",
+        f"is used. May be repeated; {KERNELS.variable} adds more, separated as in PATH.",
     ),
 ]
 """Files with kernels, which are known once the option is read."""
+
+
+def _provide_measurements(files: list[Path] | None) -> list[Path] | None:
+    MEASUREMENTS.provide(files or ())
+    return files
+
+
+Measurements = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--measurements",
+        metavar="FILE",
+        callback=_provide_measurements,
+        help="Python file with a measurement phi, or a folder of them. It is run when a "
+        f"measurement of its name is used. May be repeated; {MEASUREMENTS.variable} adds more, "
+        "separated as in PATH.",
+    ),
+]
+"""Files with measurements, which are known once the option is read."""
 Labelled = Annotated[
     list[Path],
     typer.Argument(

@@ -56,7 +56,16 @@ def evaluate_files(
     whole_surveys = grid is None
     grid = grid or VoxelSettings(fit="metric", voxel_size=card.voxel_size)
     with scratch_folder() as scratch:
-        files = read_labelled(paths, codes, grid, failures, scratch, truths=truths, target=target)
+        files = read_labelled(
+            paths,
+            codes,
+            grid,
+            failures,
+            scratch,
+            truths=truths,
+            target=target,
+            measurement=card.measurement,
+        )
     if not (whole_surveys and files.surveys):
         require_crops(files, paths, failures, target, codes)
     found = SurveyScores()

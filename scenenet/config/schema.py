@@ -16,7 +16,7 @@ from pydantic import Field, ValidationError, model_validator
 from scenenet.config.errors import explain
 from scenenet.core.errors import InputError, in_file
 from scenenet.core.provenance import FULL_BELOW_BYTES
-from scenenet.core.provided_kernels import provide, source_named
+from scenenet.core.provided_code import KERNELS
 from scenenet.core.settings import NAME, PathText, Settings
 from scenenet.dataset.crops import CropSettings
 from scenenet.dataset.labelled_towers import TowerSettings
@@ -30,6 +30,7 @@ from scenenet.experiments.label_noise.settings import LabelNoiseSettings
 from scenenet.experiments.registry import EXPERIMENTS
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.models.settings import (
+    IN_WORKFLOW,
     ModelSettings,
     TrainingSettings,
     TuningSettings,
@@ -236,6 +237,7 @@ class Config(Settings):
                     f"model {model.name}: target {model.target}: the workflow trains models of "
                     "towers; train others with scenenet train --target"
                 )
+            _require_measured_in_workflow(model.name, model)
             if not model.training.epochs:
                 raise ValueError(
                     f"model {model.name}: training.epochs 0 is only for a study; give at least 1"
@@ -243,7 +245,8 @@ class Config(Settings):
         for study in self.studies:
             if study.model not in known:
                 raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
-            study.plans(self.model_named(study.model), self.voxels, self.split)
+            for plan in study.plans(self.model_named(study.model), self.voxels, self.split):
+                _require_measured_in_workflow(f"{study.model} of study {study.name}", plan.model)
         self.label_noise_models()
         self.crossed_models()
         return self
@@ -281,7 +284,7 @@ class Config(Settings):
             InputError: a kernel cannot be read, or there are several of its name.
         """
         named = geneos_in(self.model_dump(include={"models", "studies"}))
-        sources = {name: source_named(name) for name in sorted(named)}
+        sources = {name: KERNELS.source_named(name) for name in sorted(named)}
         return {name: source.record() for name, source in sources.items() if source}
 
     def model_named(self, name: str) -> ModelSettings:
@@ -311,6 +314,15 @@ def _with_values(study: Any, values: Mapping[str, Any]) -> Any:
     if isinstance(variants := study.get("variants"), list | tuple):
         replaced["variants"] = [_with_values(variant, values) for variant in variants]
     return replaced
+
+
+def _require_measured_in_workflow(name: str, model: ModelSettings) -> None:
+    """Refuse a model whose measurement needs more than the stores of voxels have."""
+    if model.measurement not in IN_WORKFLOW:
+        raise ValueError(
+            f"model {name}: measurement {model.measurement}: the workflow measures "
+            f"{' and '.join(IN_WORKFLOW)}; train others with scenenet train --measurement"
+        )
 
 
 def geneos_in(settings: Any) -> set[str]:
@@ -348,7 +360,7 @@ def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
     kernels = raw.get("kernels")
     if isinstance(kernels, list | tuple) and all(isinstance(path, str) for path in kernels):
         with in_file(file or "configuration", "kernels"):
-            provide(kernels)
+            KERNELS.provide(kernels)
     try:
         return Config.model_validate(dict(raw))
     except ValidationError as error:

@@ -5,6 +5,9 @@ line passes through 2 % of its box. The orbit is therefore stored by position: f
 kernels that are not zero there, with their values. An occupied voxel in reach of an output adds to
 those kernels only. Most of the time is spent near the centre, where all kernels of an orbit meet
 (docs/method/performance.md has the times).
+
+Kernels that are not zero at more than ``DENSE`` of the positions are convolved one after the other
+instead. The two ways differ in the order of their sums, so by rounding.
 """
 
 from __future__ import annotations
@@ -16,9 +19,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from scenenet.convolution.convolve import convolution_gradient, convolve
+from scenenet.convolution.convolve import convolution_gradient, convolve, convolve_at_voxels
 from scenenet.convolution.occupancy import Occupancy, Shape
 from scenenet.core.compilation import COMPILED
+
+DENSE = 0.15
+"""Share of positions that are not zero from which kernels are faster one after the other: an entry
+stored by position costs about six times a position of a kernel."""
 
 
 class Orbit(NamedTuple):
@@ -31,6 +38,8 @@ class Orbit(NamedTuple):
             ``starts[q] : starts[q + 1]``.
         which: (E,) int32, the kernel of an entry.
         value: (E,) its value, of the dtype of the kernels.
+        kernels: (n, kz, ky, kx), where they are convolved one after the other; else None. There
+            are no entries then.
     """
 
     n: int
@@ -38,12 +47,21 @@ class Orbit(NamedTuple):
     starts: np.ndarray
     which: np.ndarray
     value: np.ndarray
+    kernels: Tensor | None = None
 
     @classmethod
-    def of(cls, kernels: Tensor) -> Orbit:
-        """The orbit of kernels (n, kz, ky, kx), float32 or float64."""
+    def of(cls, kernels: Tensor, dense: float = DENSE) -> Orbit:
+        """The orbit of kernels (n, kz, ky, kx), float32 or float64.
+
+        Args:
+            dense: share of positions that are not zero above which they are not stored by position.
+        """
         n, kz, ky, kx = kernels.shape
-        by_position = np.ascontiguousarray(kernels.detach().numpy().reshape(n, -1).T)
+        kernels = kernels.detach()
+        if int(torch.count_nonzero(kernels)) > dense * kernels.numel():
+            none = np.empty(0, np.int32), np.empty(0, kernels.numpy().dtype)
+            return cls(n, (kz, ky, kx), np.zeros(1, np.int64), *none, kernels)
+        by_position = np.ascontiguousarray(kernels.numpy().reshape(n, -1).T)
         position, which = np.nonzero(by_position)
         starts = np.searchsorted(position, np.arange(kz * ky * kx + 1))
         value = by_position[position, which]
@@ -63,6 +81,11 @@ def strongest_at_voxels(
     Returns:
         (M,) of the dtype of the orbit, in the order of ``at``.
     """
+    if orbit.kernels is not None:
+        best = convolve_at_voxels(occupancy, orbit.kernels[:1], at)[0]
+        for kernel in orbit.kernels[1:]:
+            torch.maximum(best, convolve_at_voxels(occupancy, kernel[None], at)[0], out=best)
+        return best.numpy()
     flat = occupancy.flat()
     depth, height, width = occupancy.shape
     rows = np.searchsorted(flat, np.arange(len(occupancy) * depth * height + 1) * width)

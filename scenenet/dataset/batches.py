@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from scenenet.convolution.occupancy import Occupancy
-from scenenet.dataset.voxels import Measurement, VoxelSample
+from scenenet.dataset.voxels import VoxelSample
+from scenenet.measurement.registry import PRESENCE
 
 
-def batch(samples: Sequence[VoxelSample], measurement: Measurement) -> tuple[Occupancy, np.ndarray]:
+def batch(samples: Sequence[VoxelSample], measurement: str) -> tuple[Occupancy, np.ndarray]:
     """Samples as one batch, on the smallest shape that contains all their grids.
 
     Smaller grids (fit metric) are padded with empty voxels at the upper end of each axis.
@@ -24,7 +25,7 @@ def batch(samples: Sequence[VoxelSample], measurement: Measurement) -> tuple[Occ
     towers = [
         b * volume + i[s.labelled] for b, (s, i) in enumerate(zip(samples, indices, strict=True))
     ]
-    phi = None if measurement == "presence" else [s.phi(measurement) for s in samples]
+    phi = None if measurement == PRESENCE else [s.phi(measurement) for s in samples]
     occupancy = Occupancy.of_grids(indices, phi, shape)
     return occupancy, np.concatenate([*towers, np.empty(0, np.int64)]).astype(np.int64)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,12 +15,13 @@ from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
 from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.core.settings import Settings
-from scenenet.dataset.crop_spool import RECORD, append, spooled
+from scenenet.dataset.crop_spool import append, record_type, spooled
 from scenenet.dataset.tower_places import TowerPlaces
 from scenenet.dataset.zarr_store import StoreReader, create
 from scenenet.pointcloud import iter_chunks, read, survey_info
 from scenenet.pointcloud.class_schemes import class_scheme
 from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.point_fields import PointField, PointFields
 from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.pointcloud.ts40k import sample_files
 
@@ -54,8 +55,8 @@ class CropSpace:
     temporary: int
 
     @classmethod
-    def of(cls, path: str | Path) -> CropSpace:
-        """For a survey, a TS40K sample or a folder of samples.
+    def of(cls, path: str | Path, fields: Sequence[PointField] = ()) -> CropSpace:
+        """For a survey, a TS40K sample or a folder of samples, with some fields of the points.
 
         Raises:
             InputError: the header of a survey cannot be read.
@@ -64,7 +65,9 @@ class CropSpace:
             points = sum(sample.stat().st_size for sample in samples) // SAMPLE_BYTES
             return cls(points, CROP_BYTES * points, 0)
         points = survey_info(path).n_points
-        return cls(points, CROP_BYTES * points, RECORD.itemsize * points)
+        spooled_bytes = record_type(fields).itemsize
+        stored = CROP_BYTES + spooled_bytes - record_type().itemsize
+        return cls(points, stored * points, spooled_bytes * points)
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,7 @@ def cut_crops(
     store: str | Path,
     manifest: str | Path,
     truth: Truth | None = None,
+    fields: Sequence[PointField] = (),
 ) -> dict[str, Any]:
     """Write every point within one tower height (planar) of each tower.
 
@@ -148,6 +152,7 @@ def cut_crops(
         manifest: path of the JSON file to write, in the same folder.
         truth: the truth of the survey; None where it is not known. A folder of samples has a
             folder with samples of the same names as its truth.
+        fields: what else is kept of each point, for measurements.
 
     Returns:
         the manifest: ``crops`` has an entry for each crop; ``skipped`` lists the samples that were
@@ -157,16 +162,16 @@ def cut_crops(
         InputError: the survey cannot be read, or the points of the truth are not its points.
         OutputError: a disk has too little space.
     """
-    space = CropSpace.of(path)
+    space = CropSpace.of(path, fields)
     check_space({Path(store): space.stored, temporary_directory(): space.temporary})
     facts: dict[str, Any] = {"survey": survey, "codes": codes, "crops": [], "skipped": []}
     samples = sample_files(path)
     clouds = (
-        _samples(survey, samples, codes, towers, settings, facts["skipped"], truth)
+        _samples(survey, samples, codes, towers, settings, facts["skipped"], truth, fields)
         if samples
-        else _cut(survey, path, codes, towers, settings, truth)
+        else _cut(survey, path, codes, towers, settings, truth, fields)
     )
-    return store_crops(clouds, facts, store, manifest, TOWER)
+    return store_crops(clouds, facts, store, manifest, TOWER, fields)
 
 
 def store_crops(
@@ -175,6 +180,7 @@ def store_crops(
     store: str | Path,
     manifest: str | Path,
     target: Target,
+    fields: Sequence[PointField] = (),
 ) -> dict[str, Any]:
     """Write crops with their points.
 
@@ -183,13 +189,17 @@ def store_crops(
         facts: of the manifest, with an empty list ``crops``.
         store, manifest: as ``cut_crops``.
         target: what the crops are for.
+        fields: of the points of ``clouds``.
 
     Returns:
         the manifest, as ``cut_crops``.
     """
+    if fields:
+        facts["fields"] = list(fields)
     with create(store, manifest, facts) as writer:
         for crop, cloud in clouds:
             arrays = {"xyz": cloud.xyz, "classification": cloud.classification}
+            arrays |= {} if cloud.fields is None else cloud.fields.arrays()
             writer.add(crop.id, arrays | ({} if cloud.truth is None else {"truth": cloud.truth}))
             facts["crops"].append(_entry(crop, cloud, target))
     return facts
@@ -231,7 +241,9 @@ class CropClouds(Mapping[str, PointCloud]):
 def _cloud(reader: StoreReader, crop: str) -> PointCloud:
     arrays = reader.get(crop)
     scheme = class_scheme(reader.manifest["codes"])
-    return PointCloud(arrays["xyz"], arrays["classification"], scheme, truth=arrays.get("truth"))
+    fields = PointFields.of_arrays(arrays, reader.manifest.get("fields", ()))
+    classes, truth = arrays["classification"], arrays.get("truth")
+    return PointCloud(arrays["xyz"], classes, scheme, truth=truth, fields=fields)
 
 
 def crop_of(entry: dict[str, Any]) -> Crop:
@@ -273,6 +285,7 @@ def _cut(
     towers: pd.DataFrame,
     settings: CropSettings,
     truth: Truth | None,
+    fields: Sequence[PointField],
 ) -> Iterator[tuple[Crop, PointCloud]]:
     centres = towers[["x", "y"]].to_numpy(float)
     radii = towers["height"].to_numpy(float) * settings.radius_in_heights
@@ -287,12 +300,14 @@ def _cut(
         ]
         for spool in spools:
             spool.touch()
-        chunks = iter_chunks(path, codes, truth=None if truth is None else truth.path)
+        chunks = iter_chunks(
+            path, codes, truth=None if truth is None else truth.path, fields=fields
+        )
         for chunk in track(chunks, f"{survey}: chunks read"):
             for number in _reaching(chunk, centres, radii):
-                append(spools[number], chunk, crops[number].inside(chunk.xyz))
+                append(spools[number], chunk, crops[number].inside(chunk.xyz), fields)
         for crop, centre, radius, spool in zip(crops, centres, radii, spools, strict=True):
-            cloud = spooled(spool, scheme, truth is not None)
+            cloud = spooled(spool, scheme, truth is not None, fields)
             near = [
                 _within(table, centre, radius)
                 for table in (towers, *(() if truth is None else (truth.towers,)))
@@ -337,10 +352,11 @@ def _samples(
     settings: CropSettings,
     skipped: list[dict[str, str]],
     truth: Truth | None,
+    fields: Sequence[PointField],
 ) -> Iterator[tuple[Crop, PointCloud]]:
     for sample in track(samples, f"{survey}: samples"):
         true = None if truth is None else truth.of_sample(sample)
-        cloud = read(sample, codes, true)
+        cloud = read(sample, codes, true, fields)
         found = towers[towers["sample"] == sample.stem]
         if len(found) == 0:
             skipped.append({"sample": sample.name, "reason": "it has no labelled tower"})

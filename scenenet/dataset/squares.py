@@ -7,7 +7,7 @@ the survey, and each square with a labelled point is a crop with all points in i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from scenenet.dataset.square_settings import SquareSettings
 from scenenet.pointcloud import iter_chunks, read, survey_info
 from scenenet.pointcloud.class_schemes import class_scheme
 from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.point_fields import PointField
 from scenenet.pointcloud.targets import Target
 from scenenet.pointcloud.ts40k import sample_files
 
@@ -35,6 +36,7 @@ def cut_squares(
     store: str | Path,
     manifest: str | Path,
     truth: Path | None = None,
+    fields: Sequence[PointField] = (),
 ) -> dict[str, Any]:
     """Write the squares of the ground plan that hold a point labelled ``target``.
 
@@ -47,6 +49,7 @@ def cut_squares(
         settings: size of a square.
         truth: a file with the same points in the same order, with the true classes, or a folder
             with samples of the same names; None where the truth is not known.
+        fields: what else is kept of each point, for measurements.
 
     Returns:
         the manifest: ``crops`` has an entry for each crop; ``skipped`` lists the files without a
@@ -56,14 +59,14 @@ def cut_squares(
         InputError: the survey cannot be read, or the points of the truth are not its points.
         OutputError: a disk has too little space.
     """
-    space = CropSpace.of(path)
+    space = CropSpace.of(path, fields)
     check_space({Path(store): space.stored, temporary_directory(): space.temporary})
     facts: dict[str, Any] = {"survey": survey, "codes": codes, "crops": [], "skipped": []}
     facts["target"] = target.text
-    cut = _Cut(survey, codes, target, facts["skipped"], truth)
+    cut = _Cut(survey, codes, target, facts["skipped"], truth, fields)
     samples = sample_files(path)
     clouds = cut.samples(samples) if samples else cut.squares(Path(path), settings.edge)
-    return store_crops(clouds, facts, store, manifest, target)
+    return store_crops(clouds, facts, store, manifest, target, fields)
 
 
 class _Cut:
@@ -76,9 +79,11 @@ class _Cut:
         target: Target,
         skipped: list[dict[str, str]],
         truth: Path | None,
+        fields: Sequence[PointField],
     ) -> None:
         self._survey, self._codes, self._target = survey, codes, target
         self._scheme, self._skipped, self._truth = class_scheme(codes), skipped, truth
+        self._fields = fields
 
     def squares(self, path: Path, edge: float) -> Iterator[tuple[Crop, PointCloud]]:
         """The squares of ``edge`` m of a survey, row by row from its lower corner."""
@@ -93,14 +98,16 @@ class _Cut:
             return
         numbers = {cell: number for number, cell in enumerate(sorted(cells), start=1)}
         with scratch_folder() as folder:
-            chunks = iter_chunks(path, self._codes, truth=self._truth)
+            chunks = iter_chunks(path, self._codes, truth=self._truth, fields=self._fields)
             for chunk in track(chunks, f"{self._survey}: chunks read"):
                 for cell, rows in _grouped(_cells(chunk.xyz[:, :2], corner, edge)):
                     if cell in numbers:
-                        append(folder / f"{numbers[cell]}", chunk, rows)
+                        append(folder / f"{numbers[cell]}", chunk, rows, self._fields)
             for (row, column), number in numbers.items():
                 centre = corner + (np.array([column, row]) + 0.5) * edge
-                cloud = spooled(folder / f"{number}", self._scheme, self._truth is not None)
+                cloud = spooled(
+                    folder / f"{number}", self._scheme, self._truth is not None, self._fields
+                )
                 yield self._crop(f"{self._survey}-{number:04d}", centre, edge / 2), cloud
 
     def samples(self, samples: list[Path]) -> Iterator[tuple[Crop, PointCloud]]:
@@ -108,7 +115,7 @@ class _Cut:
         for sample in track(samples, f"{self._survey}: samples"):
             folder = self._truth
             true = folder / sample.name if folder is not None and folder.is_dir() else folder
-            cloud = read(sample, self._codes, true)
+            cloud = read(sample, self._codes, true, self._fields)
             if not cloud.is_labelled(self._target).any():
                 self._skip(sample, np.bincount(cloud.classification, minlength=256))
                 continue

@@ -15,6 +15,7 @@ from scenenet.dataset.crops import Crop, crop_of, read_crops
 from scenenet.dataset.tower_shapes import TowerShape, measure_shape
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, VoxelSettings, voxelise
 from scenenet.dataset.zarr_store import StoreReader, create
+from scenenet.measurement.registry import PRESENCE
 from scenenet.pointcloud.targets import TOWER, Target
 
 VOXEL_BYTES = 3
@@ -27,6 +28,7 @@ def build(
     store: str | Path,
     manifest: str | Path,
     shapes: bool = True,
+    measurement: str = PRESENCE,
 ) -> dict[str, Any]:
     """Voxelise every crop of a survey.
 
@@ -37,6 +39,8 @@ def build(
         manifest: path of the JSON file to write, in the same folder.
         shapes: whether to measure the shapes of the towers, which takes 50 times as long as the
             voxels; only models with measured numbers need them.
+        measurement: phi that is needed of the voxels. Those without fields of the points need
+            nothing that is not always there.
 
     Returns:
         the manifest: ``samples`` has an entry for each crop with its grid, the numbers of occupied
@@ -65,12 +69,14 @@ def build(
         for crop, cloud in track(read_crops(crops), label, total=len(entries)):
             begin = time.perf_counter()
             with in_file(place=f"crop {crop.id}"):
-                sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id, target)
+                sample = voxelise(cloud, settings.grid(cloud.xyz), crop.id, target, measurement)
             seconds = time.perf_counter() - begin
             shape = measure_shape(crop, cloud) if shapes and target.is_tower else None
             arrays = {"index": sample.index, "count": sample.count, "tower": sample.labelled}
             if sample.true is not None:
                 arrays["true"] = sample.true
+            if sample.total is not None:
+                arrays["total"] = sample.total
             writer.add(crop.id, arrays)
             facts["samples"].append(
                 entries[crop.id]

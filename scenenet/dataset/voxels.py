@@ -11,6 +11,8 @@ from pydantic import Field
 
 from scenenet.core.errors import InputError
 from scenenet.core.settings import Settings
+from scenenet.dataset.voxel_measures import VoxelMeasures
+from scenenet.measurement.registry import PRESENCE, measurement_named
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.pointcloud.targets import TOWER, Target
 
@@ -164,6 +166,8 @@ class VoxelSample:
             not known.
         shape: of the tower in the middle, as the points of the crop show it; None where they do
             not.
+        total: (M,) int64, the sum of ``Measurement.point_steps`` over the points of each, for a
+            measurement that needs fields of the points; else None.
     """
 
     id: str
@@ -173,15 +177,20 @@ class VoxelSample:
     labelled: np.ndarray
     true: np.ndarray | None = None
     shape: TowerShape | None = None
+    total: np.ndarray | None = None
 
-    def phi(self, measurement: Measurement) -> np.ndarray:
+    def phi(self, measurement: str) -> np.ndarray:
         """The measurement at the occupied voxels, (M,) float32 in [0, 1] (thesis 4.2.2, 5.3.2).
 
-        presence: 1. density: number of points over that of the fullest voxel.
+        Raises:
+            InputError: there is no such measurement, or it does not lie in [0, 1].
         """
-        if measurement == "presence":
-            return np.ones(len(self.index), np.float32)
-        return (self.count / self.count.max()).astype(np.float32)
+        return self.measures().phi(measurement)
+
+    def measures(self) -> VoxelMeasures:
+        """What is known about the occupied voxels, for measurements."""
+        zyx = np.stack(np.unravel_index(self.index, self.grid.shape), axis=1)
+        return VoxelMeasures(zyx, self.count, self.total, self.grid.voxel_size)
 
     def spread(self, occupied: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Probability (V,) float32 and label (V,) bool of every voxel of the grid, from the
@@ -215,13 +224,18 @@ class VoxelSample:
 
 
 def voxelise(
-    cloud: PointCloud, grid: VoxelGrid, sample_id: str = "", target: Target = TOWER
+    cloud: PointCloud,
+    grid: VoxelGrid,
+    sample_id: str = "",
+    target: Target = TOWER,
+    measurement: str = PRESENCE,
 ) -> VoxelSample:
     """Count points and points labelled ``target`` in each voxel of ``grid``, those that are it in
-    truth too if known.
+    truth too if known, and sum up what ``measurement`` says about the points.
 
     Raises:
-        InputError: the class scheme of the cloud is not known.
+        InputError: the class scheme of the cloud is not known, or the measurement has a fault.
+        ValueError: the cloud does not have the fields that the measurement needs.
     """
     from scenenet.dataset.voxel_counts import tally
 
@@ -231,7 +245,13 @@ def voxelise(
     if (is_true := cloud.is_truly(target)) is not None:
         true = np.zeros(len(index), bool)
         true[np.searchsorted(index, voxel[is_true])] = True
-    return VoxelSample(sample_id, grid, index, count, labelled, true)
+    total = None
+    if (measure := measurement_named(measurement)).fields:
+        if cloud.fields is None:
+            raise ValueError(f"the points were read without the fields of {measurement}")
+        total = np.zeros(len(index), np.int64)
+        np.add.at(total, np.searchsorted(index, voxel), measure.point_steps(cloud.fields))
+    return VoxelSample(sample_id, grid, index, count, labelled, true, total=total)
 
 
 def median_voxel_size(samples: Iterable[VoxelSample]) -> float:
@@ -255,6 +275,3 @@ def _bounds(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     from scenenet.dataset.voxel_counts import extremes
 
     return extremes(xyz)
-
-
-Measurement = Literal["presence", "density"]

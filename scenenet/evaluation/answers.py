@@ -17,6 +17,7 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.evaluation.points import PointCounts
+from scenenet.measurement.registry import PRESENCE
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.pointcloud.cloud import PointCloud
 
@@ -99,14 +100,18 @@ def with_rules(
     tau: float,
     voxel_size: float,
     detection: DetectionSettings,
+    measurement: str = PRESENCE,
 ) -> Answer:
     """The answer of ``scenenet predict`` for a crop as a survey of its own.
 
     Args:
         cloud, sample: the points of the crop, and its voxels on the grid of the data set.
         voxel_size: m, of the voxels in which the survey is predicted.
+        measurement: phi that ``predict`` asks for.
     """
-    seen = voxelise(cloud, VoxelGrid.on_map(cloud.xyz, voxel_size), sample.id)
+    seen = voxelise(
+        cloud, VoxelGrid.on_map(cloud.xyz, voxel_size), sample.id, measurement=measurement
+    )
     probability, _ = predict(seen)
     of_occupied = probability[seen.index]
     detected = of_occupied >= detection.threshold(tau)
@@ -130,9 +135,11 @@ def rules_on(
     tau: float,
     voxel_size: float,
     detection: DetectionSettings,
+    measurement: str = PRESENCE,
 ) -> Callable[[VoxelSample], Answer]:
     """The answer ``with_rules`` for each crop whose points are in ``clouds`` by its id."""
-    return lambda sample: with_rules(clouds[sample.id], sample, predict, tau, voxel_size, detection)
+    how = predict, tau, voxel_size, detection, measurement
+    return lambda sample: with_rules(clouds[sample.id], sample, *how)
 
 
 def no_answer(sample: VoxelSample) -> None:

@@ -80,7 +80,8 @@ def answer_of(
     """The whole towers that a tuned model finds in each crop whose points are in ``clouds`` by its
     id."""
     size = model.observed_size(card.voxel_size)
-    return rules_on(clouds, predictor(model, card), card.threshold(), size, detection)
+    found = predictor(model, card), card.threshold(), size
+    return rules_on(clouds, *found, detection, card.measurement)
 
 
 def score(

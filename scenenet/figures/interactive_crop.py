@@ -22,7 +22,7 @@ from scenenet.results.folder import Results
 from scenenet.results.interactive_crop import InteractiveCrop, WholeTowerScores
 
 if TYPE_CHECKING:
-    from scenenet.dataset.voxels import Measurement, VoxelSample
+    from scenenet.dataset.voxels import VoxelSample
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.base import VoxelModel
 
@@ -109,9 +109,7 @@ def _scores(whole: np.ndarray, truth: np.ndarray) -> WholeTowerScores:
     return WholeTowerScores(scores["precision"], scores["recall"], scores["f05"])
 
 
-def _shares(
-    model: VoxelModel, voxels: VoxelSample, measurement: Measurement
-) -> dict[str, np.ndarray]:
+def _shares(model: VoxelModel, voxels: VoxelSample, measurement: str) -> dict[str, np.ndarray]:
     """The share of each GENEO in the output of each occupied voxel, (M,) %; empty for a CNN."""
     import torch
 

@@ -1,29 +1,15 @@
-"""Runs the code of a kernel from outside the package, and checks what it registers.
-
-Only what the user provides is run (``scenenet.core.provided_kernels``), and only when a kernel of
-its name is used. A model file makes no code run.
-"""
+"""The kernels from outside the package: their code is run, and what it registers is checked."""
 
 from __future__ import annotations
 
-import hashlib
-import linecache
-import sys
-import traceback
-from contextvars import ContextVar
 from functools import cache
-from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 
 import torch
 
-from scenenet.core.errors import InputError
-from scenenet.core.provided_kernels import KernelSource, source_of_file
+from scenenet.core.provided_code import KERNELS, CodeSource
+from scenenet.core.running_code import run
 from scenenet.geneo.kernel import GeneoKernel, Lattice, ShapeParameter
-
-REGISTERED: ContextVar[list[type[GeneoKernel]] | None] = ContextVar("registered", default=None)
-"""The kernels that the code which is being run registers; None where none is being run."""
 
 _UNITS = ("voxel", "voxel^2", "1")
 _SIZE = (7, 5, 5)
@@ -36,99 +22,18 @@ def kernel_of_file(path: str | Path) -> GeneoKernel:
     Raises:
         InputError: as ``load``, or the file cannot be a kernel.
     """
-    return load(source_of_file(path))
+    return load(KERNELS.source_of_file(path))
 
 
 @cache
-def load(source: KernelSource) -> GeneoKernel:
+def load(source: CodeSource) -> GeneoKernel:
     """The kernel of ``source``; its code is run once in a process.
 
     Raises:
         InputError: the code fails or registers no kernel of this name, or the kernel does not do
             what ``GeneoKernel`` asks for; names the file and the line.
     """
-    path = source.path
-    found: list[type[GeneoKernel]] = []
-    token = REGISTERED.set(found)
-    try:
-        kernel = _of_file(source, found) if source.file else _of_entry(source)
-        fault = _fault(kernel)
-    except InputError:
-        raise
-    except (Exception, SystemExit) as error:
-        raise _failed(path, error) from error
-    finally:
-        REGISTERED.reset(token)
-    if fault is not None:
-        raise InputError(
-            f"the kernel {source.name!r} {fault}", file=path, remedy="Correct the kernel file"
-        )
-    return kernel
-
-
-def _of_file(source: KernelSource, found: list[type[GeneoKernel]]) -> GeneoKernel:
-    path = source.path
-    content = path.read_bytes()
-    if hashlib.sha256(content).hexdigest() != source.sha256:
-        raise InputError("the file was changed while the command ran", file=path, remedy="Repeat")
-    module = ModuleType(f"scenenet.geneo.outside.{source.name}")
-    module.__file__ = str(path)
-    linecache.checkcache(str(path))
-    sys.modules[module.__name__] = module
-    try:
-        exec(compile(content, str(path), "exec"), module.__dict__)
-    except BaseException:
-        del sys.modules[module.__name__]
-        raise
-    names = [getattr(kernel, "name", "without a name") for kernel in found]
-    if not found:
-        raise InputError(
-            "the file registers no kernel",
-            file=path,
-            remedy="Decorate its subclass of GeneoKernel with @register",
-        )
-    if names != [source.name]:
-        raise InputError(
-            f"the file registers {', '.join(map(repr, names))}, and a kernel has the name of its "
-            f"file, here {source.name!r}",
-            file=path,
-            remedy="Write each kernel into a file of its own name",
-        )
-    return found[0]()
-
-
-def _of_entry(source: KernelSource) -> GeneoKernel:
-    module, _, name = (part.strip() for part in (source.entry or "").partition(":"))
-    kernel = getattr(import_module(module), name, None) if name else None
-    if not (isinstance(kernel, type) and issubclass(kernel, GeneoKernel)):
-        raise InputError(
-            f"its entry point {source.name!r} must refer to a subclass of GeneoKernel as "
-            f"MODULE:CLASS, and refers to {source.entry!r}",
-            file=source.where,
-            remedy="Correct the entry point in the package",
-        )
-    if getattr(kernel, "name", None) != source.name:
-        raise InputError(
-            f"its entry point {source.name!r} refers to a kernel called "
-            f"{getattr(kernel, 'name', None)!r}",
-            file=source.where,
-            remedy="Give the entry point the name of the kernel",
-        )
-    instance: GeneoKernel = kernel()
-    return instance
-
-
-def _failed(path: Path, error: BaseException) -> InputError:
-    """What is wrong with code that raised ``error``, and in which line of ``path``."""
-    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == str(path)]
-    line = error.lineno if isinstance(error, SyntaxError) else (lines[-1] if lines else None)
-    text = error.msg if isinstance(error, SyntaxError) else str(error)
-    return InputError(
-        f"the kernel file fails with {type(error).__name__}: {text}".rstrip(": "),
-        file=path,
-        place=None if line is None else f"line {line}",
-        remedy="Correct the file",
-    )
+    return run(source, GeneoKernel, _fault)  # type: ignore[type-abstract]
 
 
 def _fault(kernel: GeneoKernel) -> str | None:

@@ -8,7 +8,8 @@ import pkgutil
 from functools import cache
 
 from scenenet.core.errors import InputError
-from scenenet.core.provided_kernels import VARIABLE, provided, source_named
+from scenenet.core.provided_code import KERNELS
+from scenenet.core.running_code import REGISTERED
 from scenenet.geneo import kernels, outside
 from scenenet.geneo.kernel import GeneoKernel
 
@@ -18,12 +19,12 @@ _KERNELS: dict[str, GeneoKernel] = {}
 def register(kernel: type[GeneoKernel]) -> type[GeneoKernel]:
     """Class decorator: register ``kernel`` under its ``name``.
 
-    A class in a kernel file from outside the package is kept for ``scenenet.geneo.outside``.
+    A class in a kernel file from outside the package is kept for ``scenenet.core.running_code``.
 
     Raises:
         ValueError: another class has this name.
     """
-    if (registered := outside.REGISTERED.get()) is not None:
+    if (registered := REGISTERED.get()) is not None:
         registered.append(kernel)
         return kernel
     known = _KERNELS.get(kernel.name)
@@ -47,7 +48,7 @@ def kernel_names() -> list[str]:
         InputError: a file that the user provides cannot be a kernel.
     """
     _discover()
-    return sorted({*_KERNELS, *provided()})
+    return sorted({*_KERNELS, *KERNELS.provided()})
 
 
 def is_registered(name: str) -> bool:
@@ -66,7 +67,7 @@ def kernel_named(name: str) -> GeneoKernel:
     _discover()
     if name in _KERNELS:
         return _KERNELS[name]
-    if (source := source_named(name)) is not None:
+    if (source := KERNELS.source_named(name)) is not None:
         return outside.load(source)
     names = kernel_names()
     close = difflib.get_close_matches(name, names, n=1)
@@ -74,5 +75,5 @@ def kernel_named(name: str) -> GeneoKernel:
     raise InputError(
         f"unknown GENEO kernel {name!r}{hint}",
         remedy=f"Name one of: {', '.join(names)}, or provide its file with --kernels or in "
-        f"{VARIABLE}",
+        f"{KERNELS.variable}",
     )

@@ -9,10 +9,12 @@ from __future__ import annotations
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from scenenet.interpretability.bounded_measurement import bounded
 from scenenet.interpretability.composed_properties import ComposedCertificate, certify_composed
 from scenenet.interpretability.equivariance import Scene, sample_scene
 from scenenet.interpretability.geneo_properties import ANGLES_DEG, Certificate, certify
 from scenenet.interpretability.result import ModelCertificate, Statement
+from scenenet.measurement.registry import PRESENCE
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.model_file import ModelCard, read_model
 
@@ -46,7 +48,7 @@ def certificate(model: str | Path) -> ModelCertificate:
         found.l1,
         1.0,
         # For presence the property holds with any kernel, so no number supports it.
-        found.measured_model if found.measurement == "density" else None,
+        found.measured_model if found.measurement != PRESENCE else None,
         max((k.slice_sum for k in found.kernels if k.sums_to_zero), default=None),
         found.weight_sum,
     )
@@ -84,7 +86,7 @@ def _written(
         scene=SCENE,
         half_voxel=found.half_voxel,
         turns=found.turns,
-        statements=statements,
+        statements=(*statements, *bounded(card.measurement, size)),
         numbers=numbers,
     )
 

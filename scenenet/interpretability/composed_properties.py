@@ -11,7 +11,9 @@ convex combination is at most the combination of the constants, and that of a co
 their product. The largest constant that was measured, between random measurements in [0, 1] and
 small changes of them, stands beside this bound and never exceeds it.
 
-**Convexity.** The mixing weights of each observer sum to one and none is negative.
+**Convexity.** The mixing weights of each observer sum to one and none is negative. A maximum or a
+product of operators is no convex combination; what bounds its constant is in
+``scenenet.models.mixing``.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ from scenenet.interpretability.equivariance import Scene, measured_errors, obser
 from scenenet.interpretability.orbits import OrbitFacts, orbit_facts
 from scenenet.interpretability.result import Statement, Turn
 from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.mixing import constant
+from scenenet.models.settings import Mixing
 
 ROUNDING = 1e-4
 """Largest error, as a share of max |H|, that counts as rounding."""
@@ -43,12 +47,15 @@ class StageFacts:
     Attributes:
         name: "first observer" or "observer".
         weights: mixing weight of each GENEO, by name.
-        constant: sum of lambda ||g||_1, a bound of its constant (Eq. 3.2).
+        constant: a bound of its constant (Eq. 3.2), from lambda ||g||_1 of each GENEO; that of
+            (tanh H)+ for a product.
+        mixing: how its GENEOs become one.
     """
 
     name: str
     weights: dict[str, float]
     constant: float
+    mixing: Mixing = "convex"
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,8 @@ class ComposedCertificate:
         orbits: of its kernels with a direction.
         stages: the first observer, if there is one, and the observer.
         l1_bound: product of the constants of the stages.
-        measured: the largest |H_1 - H_2| / |phi_1 - phi_2| between measurements, in the sup norm.
+        measured: the largest |H_1 - H_2| / |phi_1 - phi_2| between measurements, in the sup norm;
+            of (tanh H)+ for a product.
         tau: threshold; None before tuning.
     """
 
@@ -100,7 +108,7 @@ class ComposedCertificate:
             *(_of_orbit(orbit) for orbit in self.orbits),
             self._any_turn(),
             Statement(
-                "the observer H is non-expansive without scaling",
+                f"the {self._bounded} is non-expansive without scaling",
                 "Eq. 3.2, 4.3",
                 self.l1_bound <= 1 + ROUNDING,
                 f"its constant is at most {self.l1_bound:.3g}, the product of the constants of its "
@@ -110,6 +118,11 @@ class ComposedCertificate:
             ),
             *(_convexity(stage) for stage in self.stages),
         ]
+
+    @property
+    def _bounded(self) -> str:
+        product = any(stage.mixing == "product" for stage in self.stages)
+        return "model M" if product else "observer H"
 
     def _any_turn(self) -> Statement:
         between = [t for t in self.turns if t.degrees is not None and t.degrees % 90]
@@ -160,14 +173,15 @@ def certify_composed(
 def _stage(prefix: str, model: GeneoModel) -> StageFacts:
     weights = model.mixing_weights().double().tolist()
     norms = [float(orbit.double().abs().sum(dim=(1, 2, 3)).max()) for orbit in model.orbits()]
-    constant = sum(abs(w) * norm for w, norm in zip(weights, norms, strict=True))
+    bound = constant([abs(w) * norm for w, norm in zip(weights, norms, strict=True)], model.mixes)
     name = "first observer" if prefix else "observer"
-    return StageFacts(name, dict(zip(model.names, weights, strict=True)), constant)
+    return StageFacts(name, dict(zip(model.names, weights, strict=True)), bound, model.mixes)
 
 
 def _measured_constant(model: GeneoModel, seed: int) -> float:
-    """The largest |H_1 - H_2| / |phi_1 - phi_2| between random measurements and small changes of
-    them, in a window as wide as the reach of the model, whose middle the whole window influences.
+    """The largest |H_1 - H_2| / |phi_1 - phi_2|, or that of (tanh H)+ for a product of operators,
+    between random measurements and small changes of them, in a window as wide as the reach of the
+    model, whose middle the whole window influences.
 
     The voxels are those of both measurements, because the model answers at occupied ones.
     """
@@ -182,6 +196,8 @@ def _measured_constant(model: GeneoModel, seed: int) -> float:
         step = np.float32(0.05)
         after = before + step * np.sign(rng.normal(size=len(index))).astype(np.float32)
         one, other = (observe(Occupancy.of_grids([index], [phi], shape)) for phi in (before, after))
+        if model.mixes == "product":
+            one, other = (torch.relu(torch.tanh(h)) for h in (one, other))
         found = max(found, float((one - other).abs().max()) / float(step))
     return found
 
@@ -202,6 +218,14 @@ def _convexity(stage: StageFacts) -> Statement:
     total, negative = sum(stage.weights.values()), [n for n, w in stage.weights.items() if w < 0]
     weights = ", ".join(f"{name} {weight:.3f}" for name, weight in stage.weights.items())
     wrong = f"; negative: {', '.join(negative)}" if negative else ""
+    if stage.mixing != "convex":
+        return Statement(
+            f"{stage.name}: convex combination of GENEOs",
+            "Eq. 4.1, 4.5",
+            False,
+            f"it is the {stage.mixing} of its GENEOs, with weights {weights}{wrong}",
+            total,
+        )
     return Statement(
         f"{stage.name}: convex combination of GENEOs",
         "Eq. 4.1, 4.5",

@@ -15,8 +15,10 @@ from torch import Tensor
 from scenenet.convolution.convolve import convolve
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
-from scenenet.dataset.voxels import MAX_VOXELS, Measurement, VoxelGrid, VoxelSample
+from scenenet.dataset.voxels import MAX_VOXELS, VoxelGrid, VoxelSample
 from scenenet.interpretability.result import Turn
+from scenenet.measurement.registry import measurement_named
+from scenenet.pointcloud.point_fields import PointFields
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
@@ -33,15 +35,18 @@ class Scene:
         xyz: (N, 3) m, centred.
         grid: with the axis in the middle of a voxel column.
         measurement: phi of the voxels.
+        steps: (N,) uint16, the value of each point (``Measurement.point_steps``), which it keeps
+            when the scene moves; None for a measurement that needs no field of the points.
     """
 
     xyz: np.ndarray
     grid: VoxelGrid
-    measurement: Measurement
+    measurement: str
+    steps: np.ndarray | None = None
 
     @classmethod
-    def of(cls, points: np.ndarray, voxel_size: float, measurement: Measurement) -> Scene:
-        """The scene of points (N, 3) xyz, m.
+    def of(cls, points: np.ndarray, voxel_size: float, measurement: str) -> Scene:
+        """The scene of points (N, 3) xyz, m. Fields that the measurement needs are random.
 
         Raises:
             InputError: there are no points, or the grid needs more than ``MAX_VOXELS`` voxels.
@@ -61,13 +66,22 @@ class Scene:
                 remedy="Use a smaller scene or larger voxels",
             )
         origin = (-n * voxel_size / 2, -n * voxel_size / 2, -nz * voxel_size / 2)
-        return cls(xyz, VoxelGrid(origin, voxel_size, (nz, n, n)), measurement)
+        grid, steps = VoxelGrid(origin, voxel_size, (nz, n, n)), None
+        if (measure := measurement_named(measurement)).fields:
+            fields = PointFields.random(len(xyz), measure.fields, np.random.default_rng(0))
+            steps = measure.point_steps(fields)
+        return cls(xyz, grid, measurement, steps)
 
     def voxelised(self, xyz: np.ndarray) -> tuple[Occupancy, np.ndarray]:
         """The points (N, 3) on the grid, and the flat voxel position (N,) of each point."""
         at = self.grid.voxel_of(np.ascontiguousarray(xyz))
-        index, count = np.unique(at, return_counts=True)
-        sample = VoxelSample("", self.grid, index, count, np.zeros(len(index), bool))
+        index, inverse, count = np.unique(at, return_inverse=True, return_counts=True)
+        total = None
+        if self.steps is not None:
+            total = np.zeros(len(index), np.int64)
+            np.add.at(total, inverse, self.steps)
+        none = np.zeros(len(index), bool)
+        sample = VoxelSample("", self.grid, index, count, none, total=total)
         return Occupancy.of_grids([index], [sample.phi(self.measurement)], self.grid.shape), at
 
     def turned(self, degrees: float) -> np.ndarray:

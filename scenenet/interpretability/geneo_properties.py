@@ -41,7 +41,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import torch
 
-from scenenet.dataset.voxels import Measurement
 from scenenet.geneo import kernel_named
 from scenenet.interpretability.equivariance import (
     Scene,
@@ -119,7 +118,7 @@ class Certificate:
     """
 
     kind: str
-    measurement: Measurement
+    measurement: str
     kernels: tuple[Kernel, ...]
     translation_error: float
     quarter_turn_error: float
@@ -271,7 +270,7 @@ def certify(
     points: np.ndarray | None = None,
     *,
     voxel_size: float = 1.0,
-    measurement: Measurement = "presence",
+    measurement: str = "presence",
     tau: float | None = None,
     angles: Sequence[float] = ANGLES_DEG,
     seed: int = 0,

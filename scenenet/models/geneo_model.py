@@ -17,6 +17,8 @@ from scenenet.core.errors import InputError
 from scenenet.geneo import GeneoKernel, ShapeParameter, kernel_named
 from scenenet.models.base import VoxelModel
 from scenenet.models.known_answers import KnownAnswers
+from scenenet.models.mixing import mixed
+from scenenet.models.settings import Mixing
 
 
 class GeneoModel(VoxelModel):
@@ -104,7 +106,13 @@ class GeneoModel(VoxelModel):
 
     @property
     def linear(self) -> bool:
-        return not any(kernel_named(geneo).oriented for geneo in self.geneos)
+        oriented = any(kernel_named(geneo).oriented for geneo in self.geneos)
+        return self.mixes == "convex" and not oriented
+
+    @property
+    def mixes(self) -> Mixing:
+        """How the answers of its GENEOs become one."""
+        return "convex"
 
     def shape_list(self) -> list[tuple[str, ShapeParameter]]:
         """Each of its own shape parameters, with the name of its GENEO."""
@@ -112,7 +120,7 @@ class GeneoModel(VoxelModel):
 
     def observer(self) -> tuple[Tensor, None]:
         if not self.linear:
-            raise NotImplementedError("the maximum over an orbit is not one kernel")
+            raise NotImplementedError("a maximum or a product of responses is not one kernel")
         return torch.einsum("k,kzyx->zyx", self.mixing_weights(), self.kernels()), None
 
     def forward(self, occupancy: Occupancy) -> Tensor:
@@ -121,7 +129,8 @@ class GeneoModel(VoxelModel):
         return torch.relu(torch.tanh(self.contributions(occupancy).sum(dim=0)))
 
     def contributions(self, occupancy: Occupancy) -> Tensor:
-        """Contribution of each GENEO to the observer, lambda_k (g_k * x), (K, B, D, H, W).
+        """Contribution of each GENEO to the observer, (K, B, D, H, W): lambda_k (g_k * x) where
+        they are summed up (``scenenet.models.mixing``).
 
         The sum over k is H, the observer's response before tanh.
         """
@@ -131,7 +140,8 @@ class GeneoModel(VoxelModel):
             strongest(occupancy, orbit) if len(orbit) > 1 else convolve(occupancy, orbit[0])
             for orbit in self.orbits()
         ]
-        return torch.stack([w * h for w, h in zip(self.mixing_weights(), answers, strict=True)])
+        weighted = [w * h for w, h in zip(self.mixing_weights(), answers, strict=True)]
+        return mixed(torch.stack(weighted), self.mixes)
 
     @abstractmethod
     def orbit_of(self, name: str, azimuth: float = 0.0) -> Tensor:
@@ -154,7 +164,7 @@ class GeneoModel(VoxelModel):
 
         def parts(occupancy: Occupancy) -> Tensor:
             answers = known.answers(own, state, occupancy, lambda: _answers(orbits, occupancy))
-            return weights[:, None] * answers
+            return mixed(weights[:, None] * answers, self.mixes)
 
         return parts
 

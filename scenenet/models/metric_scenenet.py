@@ -34,6 +34,7 @@ from scenenet.models.settings import (
     THESIS_GENEOS,
     KernelSize,
     MetricSettings,
+    Mixing,
 )
 
 COLUMN_M = 2.0
@@ -122,7 +123,8 @@ class MetricSceneNet(GeneoModel):
         kernels. The first observer answers for each voxel itself, not for a cross-section."""
         before = None
         if first:
-            alone = metric.model_copy(update={"section_radius": 0.0, "section_above": 0.0})
+            plain = {"section_radius": 0.0, "section_above": 0.0, "mixing": "convex"}
+            alone = metric.model_copy(update=plain)
             before = cls(first, alone, generator=generator)
         return cls(geneos, metric, first=before, generator=generator)
 
@@ -268,6 +270,10 @@ class MetricSceneNet(GeneoModel):
     @property
     def linear(self) -> bool:
         return super().linear and self.first is None
+
+    @property
+    def mixes(self) -> Mixing:
+        return self.metric.mixing
 
     def responder(self, known: KnownAnswers | None = None) -> Callable[[Occupancy], Tensor]:
         if self.linear:

@@ -21,13 +21,14 @@ from torch import Tensor
 from scenenet.convolution.coarsening import OBSERVED_M
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, write_json
+from scenenet.core.provided_code import MEASUREMENTS
 from scenenet.core.settings import Settings
-from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL, Fit, Measurement
+from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL, Fit
 from scenenet.models.base import VoxelModel
 from scenenet.models.cnn import CNN
+from scenenet.models.code_records import CodeMissing, record_of, require, require_kernels
 from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel
-from scenenet.models.kernel_records import KernelMissing, record_of, require_kernels
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import LARGEST_KERNEL, KernelSize, MetricSettings, TargetText
@@ -37,13 +38,15 @@ FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
 COMPOSED_VERSION = 5
 """Version of the file of a SCENE-Net in metres that is not one kernel: it has kernels with a
-direction or a first observer, or observes blocks of another size."""
+direction or a first observer, is no sum of kernels, or observes blocks of another size."""
 METRIC_VERSION = 4
 """Version of the file of every other SCENE-Net in metres."""
 SEARCHED_VERSION = 3
 """Version of the same file before numbers were measured: all of them are searched."""
 FIELD_VERSION = 2
 """Version of the same file from version 0.1 of this package, where the lengths are ``field``."""
+MEASUREMENT_KEY = "measurement_source"
+"""Key of the record of a measurement from outside the package (``models.code_records``)."""
 
 
 class ModelCard(Settings):
@@ -52,7 +55,7 @@ class ModelCard(Settings):
     name: str = Field(description="name in results and tables")
     codes: str = Field(description="class scheme of the training labels")
     target: TargetText = Field(TOWER.text, description="what it finds")
-    measurement: Measurement = Field(description="phi of its input")
+    measurement: str = Field(description="phi of its input")
     fit: Fit = Field(description="kind of grid that it was trained on")
     resolution: int = Field(gt=0, description="voxels per edge of that grid, for fit cube")
     voxel_size: float = Field(
@@ -119,6 +122,7 @@ def write_model(path: str | Path, model: VoxelModel, card: ModelCard) -> None:
         "kind": model.kind,
         "kernel_size": list(model.kernel_size),
         **card.model_dump(),
+        **record_of(card.measurement, MEASUREMENTS, MEASUREMENT_KEY),
     }
     if Path(path).suffix != suffix(model.kind):
         raise ValueError(f"the file of a {model.kind} must end in {suffix(model.kind)}, not {path}")
@@ -138,7 +142,7 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
     Raises:
         InputError: the file does not exist, this version cannot read it, or a number in it is
             not finite or out of bounds.
-        KernelMissing: a kernel from outside the package is not provided, or is another one.
+        CodeMissing: a kernel from outside the package is not provided, or is another one.
     """
     path = Path(path)
     if not path.is_file():
@@ -171,7 +175,7 @@ def is_model_file(path: str | Path) -> bool:
     """Whether the file is a model that this version can read, given its kernels."""
     try:
         read_model(path)
-    except KernelMissing:
+    except CodeMissing:
         return True
     except InputError:
         return False
@@ -221,6 +225,7 @@ def _numbers(model: GeneoModel) -> dict[str, Any]:
 
 def _read_scenenet(data: Mapping[str, Any]) -> tuple[GeneoModel, ModelCard]:
     _check_head(data)
+    _require_measurement(data)
     require_kernels([*data["geneos"], *data.get("first", {"geneos": []})["geneos"]])
     geneos = [entry["kernel"] for entry in data["geneos"]]
     version = data["format_version"]
@@ -266,6 +271,7 @@ def _read_cnn(path: Path) -> tuple[CNN, ModelCard]:
     except SafetensorError as error:
         raise ValueError(str(error)) from None
     _check_head(head)
+    _require_measurement(head)
     size = _size(head)
     _check_weights(tensors, size)
     model = CNN(len(tensors["bias"]), size)
@@ -331,6 +337,23 @@ def _check_head(data: Mapping[str, Any]) -> None:
             f"model format {data['format_version']}; this version reads formats "
             f"{', '.join(map(str, readable))}",
             remedy="Use the version of scenenet that wrote it, or train the model again",
+        )
+
+
+def _require_measurement(data: Mapping[str, Any]) -> None:
+    """Compare the measurement of a model file with the one that is provided; no code is run.
+
+    Raises:
+        CodeMissing: it is missing, or is another one than the model was trained with.
+        InputError: there is no such measurement.
+    """
+    name, record = data["measurement"], data.get(MEASUREMENT_KEY)
+    require(name, record, MEASUREMENTS, of_package=name in MEASUREMENTS.built_in())
+    if name not in MEASUREMENTS.known():
+        known = ", ".join(sorted(MEASUREMENTS.built_in()))
+        raise InputError(
+            f"its measurement {name!r} is none of {known}",
+            remedy="Use the version of scenenet that wrote it",
         )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -14,7 +14,8 @@ from scenenet.convolution.cross_section import Section, strongest
 from scenenet.convolution.observer import count_reached
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.dataset.batches import batch
-from scenenet.dataset.voxels import Measurement, VoxelSample
+from scenenet.dataset.voxels import VoxelSample
+from scenenet.measurement.registry import PRESENCE
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
 from scenenet.models.base import VoxelModel
 from scenenet.models.known_answers import KnownAnswers
@@ -25,7 +26,7 @@ EVALUATED_AT_ONCE = 8
 
 
 def threshold_curve(
-    model: VoxelModel, samples: Sequence[VoxelSample], measurement: Measurement
+    model: VoxelModel, samples: Sequence[VoxelSample], measurement: str
 ) -> ThresholdCurve:
     """Scores at every threshold over all voxels of ``samples``, empty ones included."""
     if isinstance(model, MetricSceneNet):
@@ -44,7 +45,7 @@ def threshold_curve(
 
 
 def probabilities(
-    model: VoxelModel, sample: VoxelSample, measurement: Measurement
+    model: VoxelModel, sample: VoxelSample, measurement: str
 ) -> tuple[np.ndarray, np.ndarray]:
     """Probability (V,) float32 and labels (V,) bool of every voxel of the sample's grid."""
     if isinstance(model, MetricSceneNet):
@@ -95,15 +96,20 @@ class PreparedCrop:
 
 
 def prepare_crops(
-    model: MetricSceneNet, samples: Sequence[VoxelSample], measurement: Measurement
+    model: MetricSceneNet, samples: Sequence[VoxelSample], measurement: str
 ) -> list[PreparedCrop]:
     """Prepare ``samples`` for repeated predictions by ``model``."""
     crops = []
     for sample in samples:
-        occupancy, _ = batch([sample], measurement)
+        occupancy, _ = batch([sample], PRESENCE)
         edge = model.block_edge(sample.grid.voxel_size)
         observed, row = coarsened(occupancy, edge)
         size = edge * sample.grid.voxel_size
+        if measurement != PRESENCE:
+            # Of the blocks, as a survey is measured in voxels of their size.
+            zyx = np.stack(np.unravel_index(observed.index, observed.shape), axis=1)
+            phi = sample.measures().in_blocks(row, zyx, size).phi(measurement)
+            observed = replace(observed, values=phi)
         section = model.at(size).section(observed) if model.linear else None
         crops.append(
             PreparedCrop(observed, size, section, row, sample.labelled, sample.grid.n_voxels)

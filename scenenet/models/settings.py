@@ -19,9 +19,9 @@ from pydantic import (
     model_validator,
 )
 
-from scenenet.core.provided_kernels import known_kernels
+from scenenet.core.provided_code import KERNELS
 from scenenet.core.settings import Settings
-from scenenet.dataset.voxels import Measurement
+from scenenet.measurement.registry import PRESENCE, MeasurementName
 from scenenet.pointcloud.targets import ROLES, TOWER, Target, canonical
 
 LARGEST_KERNEL = 64
@@ -43,7 +43,10 @@ BOOSTED_TREES = "boosted trees"
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
 
 Protocol = Literal["thesis", "operational"]
+Mixing = Literal["convex", "maximum", "product"]
 Init = Literal["thesis", "informed", "unranged", "handcrafted", "published"]
+IN_WORKFLOW = ("presence", "density")
+"""Measurements of the workflow. Its crops and its work files keep no other fields of points."""
 GENEO_INITS: tuple[Init, ...] = ("unranged", "handcrafted", "published")
 """Initialisations that only a SCENE-Net has, because a CNN has no parameter ranges."""
 
@@ -54,7 +57,7 @@ def _known_kernel(name: str) -> str:
     A kernel has the name of its file. The files are listed and not imported, because that would
     load torch; kernels that this process has registered are known once the registry is loaded.
     """
-    known = known_kernels()
+    known = KERNELS.known()
     if registry := sys.modules.get("scenenet.geneo.registry"):
         known |= set(registry.kernel_names())
     if name not in known:
@@ -113,6 +116,12 @@ class MetricSettings(Settings):
         description="m, edge of the blocks of voxels in which a finer grid is observed: a metre "
         "for towers, less for what is thinner and closer together",
     )
+    mixing: Mixing = Field(
+        "convex",
+        description="how the kernels become one observer: their weighted sum (thesis Eq. 4.1), the "
+        "largest weighted response, or the product of their probabilities "
+        "(docs/method/observers.md). A first observer is a weighted sum",
+    )
     whole_towers: bool = Field(
         True,
         description="predict all voxels of detected towers, bodies included "
@@ -124,8 +133,9 @@ class MetricSettings(Settings):
         """Settings of later versions stand in records only where they differ from what every
         earlier version did, so that the records of its models stay the same."""
         raw: dict[str, Any] = dump(self)
-        if self.observed == type(self).model_fields["observed"].default:
-            raw.pop("observed", None)
+        for name in ("observed", "mixing"):
+            if getattr(self, name) == type(self).model_fields[name].default:
+                raw.pop(name, None)
         return raw
 
 
@@ -254,7 +264,11 @@ class ModelSettings(Settings):
     )
     n_kernels: int = Field(3, ge=1, description="kernels of a CNN")
     kernel_size: KernelSize = Field((9, 9, 9), description="(kz, ky, kx) in voxels")
-    measurement: Measurement = Field("presence", description="phi (thesis 4.2.2, 5.3.2)")
+    measurement: MeasurementName = Field(
+        PRESENCE,
+        description="phi (thesis 4.2.2, 5.3.2; docs/guides/measurements.md)",
+        json_schema_extra={"enum": list(IN_WORKFLOW)},
+    )
     training: TrainingSettings = TrainingSettings()
 
     @property

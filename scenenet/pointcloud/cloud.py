@@ -9,6 +9,7 @@ import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme
+from scenenet.pointcloud.point_fields import PointFields
 from scenenet.pointcloud.targets import TOWER, Target
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ class PointCloud:
         crs: coordinate reference system; None if the file names none.
         truth: (N,) uint8 true class codes, where a second file has them; else None.
             ``classification`` are then the labels, which may differ.
+        fields: what else is known about the points, for measurements; None where it was not asked
+            for.
     """
 
     xyz: np.ndarray
@@ -34,6 +37,7 @@ class PointCloud:
     scheme: ClassScheme | None = None
     crs: pyproj.CRS | None = None
     truth: np.ndarray | None = None
+    fields: PointFields | None = None
 
     def __post_init__(self) -> None:
         xyz, codes = np.asarray(self.xyz), np.asarray(self.classification)
@@ -121,4 +125,6 @@ class PointCloud:
     def select(self, index: np.ndarray) -> PointCloud:
         """The points at ``index`` (a mask or positions), in that order."""
         truth = None if self.truth is None else self.truth[index]
-        return PointCloud(self.xyz[index], self.classification[index], self.scheme, self.crs, truth)
+        fields = None if self.fields is None else self.fields.select(index)
+        classes = self.classification[index]
+        return PointCloud(self.xyz[index], classes, self.scheme, self.crs, truth, fields)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +16,12 @@ from scenenet.pointcloud.file_kinds import kind_of
 from scenenet.pointcloud.las.crs import CrsRecord, read_crs, with_system
 from scenenet.pointcloud.las.header import read_header
 from scenenet.pointcloud.las.records import class_codes, coordinates, iter_records
+from scenenet.pointcloud.point_fields import (
+    PointField,
+    PointFields,
+    missing_field,
+    with_recorded,
+)
 from scenenet.pointcloud.true_classes import ROUNDING_M, check_same_number, with_true_classes
 from scenenet.pointcloud.ts40k import read_sample
 from scenenet.pointcloud.units import NotMetres, not_metres, sizes, unit_name
@@ -161,6 +167,7 @@ def iter_chunks(
     codes: str | None = None,
     chunk_points: int = CHUNK_POINTS,
     truth: str | Path | None = None,
+    fields: Sequence[PointField] = (),
 ) -> Iterator[PointCloud]:
     """The points of a survey in the order of the file, in chunks.
 
@@ -173,10 +180,12 @@ def iter_chunks(
         codes: class scheme (a name of ``SCHEMES``); None if unknown.
         chunk_points: points in each chunk except the last.
         truth: a second file with the same points in the same order, whose classes are the truth.
+        fields: what else is read of each point.
 
     Raises:
         InputError: a file cannot be read; the message names it and the reason, even if the
-            decoder hung or crashed. Or the points of the two files differ; the message names the
+            decoder hung or crashed. Or it does not have ``fields``, which may be known at its end
+            only. Or the points of the two files differ; the message names the
             first that does.
     """
     if chunk_points < 1:
@@ -185,17 +194,30 @@ def iter_chunks(
     scheme = None if codes is None else class_scheme(codes)
     if truth is not None:
         tolerance = same_points(path, truth)
-        chunks, true = (iter_chunks(p, codes, chunk_points) for p in (path, truth))
+        chunks = iter_chunks(path, codes, chunk_points, fields=fields)
+        true = iter_chunks(truth, codes, chunk_points)
         return with_true_classes(path, chunks, Path(truth), true, tolerance)
     kind = kind_of(path)
     if kind != "las":
+        if fields:
+            raise missing_field(path, fields[0])
         xyz, classes = read_sample(path, kind)
         parts = (slice(at, at + chunk_points) for at in range(0, len(xyz), chunk_points))
         return (PointCloud(xyz[part], classes[part], scheme) for part in parts)
     header = read_header(path)
     crs = read_crs(header.records).crs
-    chunks = iter_records(header, chunk_points, places_only=True)
-    return (PointCloud(coordinates(c), class_codes(c), scheme, crs) for c in chunks)
+    records = iter_records(header, chunk_points, places_only=not fields)
+    chunks = (
+        PointCloud(
+            coordinates(each),
+            class_codes(each),
+            scheme,
+            crs,
+            fields=PointFields.of_records(each, fields),
+        )
+        for each in records
+    )
+    return with_recorded(path, chunks, fields) if fields else chunks
 
 
 def same_points(labelled: str | Path, truth: str | Path) -> np.ndarray:
@@ -213,13 +235,18 @@ def same_points(labelled: str | Path, truth: str | Path) -> np.ndarray:
     return np.sum(steps, axis=0) / 2 + ROUNDING_M
 
 
-def read(path: str | Path, codes: str | None = None, truth: str | Path | None = None) -> PointCloud:
+def read(
+    path: str | Path,
+    codes: str | None = None,
+    truth: str | Path | None = None,
+    fields: Sequence[PointField] = (),
+) -> PointCloud:
     """A whole survey as one cloud; see ``iter_chunks`` for surveys larger than memory.
 
     Raises:
         InputError: as ``iter_chunks``.
     """
-    chunks = list(iter_chunks(path, codes, truth=truth))
+    chunks = list(iter_chunks(path, codes, truth=truth, fields=fields))
     if len(chunks) == 1:
         return chunks[0]
     scheme = None if codes is None else class_scheme(codes)
@@ -228,7 +255,14 @@ def read(path: str | Path, codes: str | None = None, truth: str | Path | None = 
     xyz = np.concatenate([chunk.xyz for chunk in chunks])
     classes = np.concatenate([chunk.classification for chunk in chunks])
     true = [chunk.truth for chunk in chunks if chunk.truth is not None]
-    return PointCloud(xyz, classes, scheme, chunks[0].crs, np.concatenate(true) if true else None)
+    return PointCloud(
+        xyz,
+        classes,
+        scheme,
+        chunks[0].crs,
+        np.concatenate(true) if true else None,
+        PointFields.joined([chunk.fields for chunk in chunks]),
+    )
 
 
 def _triple(values: np.ndarray) -> tuple[float, float, float]:

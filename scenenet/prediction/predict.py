@@ -30,6 +30,7 @@ from scenenet.prediction.work.block_file import BlockFile
 from scenenet.prediction.work.survey_work import SurveyWork
 from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tile_predictor import fullest_voxel, predict_file
+from scenenet.prediction.work.tiling import Layer
 from scenenet.prediction.work.work_file import WorkFile, read_file
 from scenenet.prediction.work.work_folder import WorkFolder
 
@@ -83,13 +84,13 @@ def predict_survey(
         survey = SurveyFiles.of(survey)
     used = use_models(models, settings, scheme)
     first, tau = used[0], used[0].card.threshold()
-    sizes = list(dict.fromkeys(each.voxel_size for each in used))
+    layers = list(dict.fromkeys([Layer(first.voxel_size), *(each.layer for each in used)]))
     headers, _ = look_at(survey)
     size = scratch_bytes(len(used)) * sum(info.n_points for info in headers.values())
     place = temporary_directory() if work is None else work.folder
     check_space({place: size - (0 if work is None else work.bytes_kept())})
     with nullcontext(work) if work is not None else _scratch() as folder:
-        _read_files(survey, folder, sizes, settings.chunk_points)
+        _read_files(survey, folder, layers, settings.chunk_points)
         joined = SurveyWork.open(survey, folder.reads(survey))
         tiles = [_predict_files(joined, folder, each) for each in used]
         found = FoundTowers.none()
@@ -101,7 +102,7 @@ def predict_survey(
                 write_json(folder.towers, found.to_json())
             found = FoundTowers.from_json(read_json(folder.towers))
         further = [
-            FurtherModel(each, joined.spool_at(each.voxel_size), predicted)
+            FurtherModel(each, joined.spool_at(each.layer), predicted)
             for each, predicted in zip(used[1:], tiles[1:], strict=True)
         ]
         yield SurveyPrediction.of(
@@ -131,16 +132,16 @@ def _scratch() -> Iterator[WorkFolder]:
 
 
 def _read_files(
-    survey: SurveyFiles, folder: WorkFolder, voxel_sizes: Sequence[float], chunk_points: int
+    survey: SurveyFiles, folder: WorkFolder, layers: Sequence[Layer], chunk_points: int
 ) -> None:
-    """Read the files that are not in ``folder`` yet, for voxels of different sizes, m; points are
-    kept in tiles of those of the first size."""
-    size, *further = voxel_sizes
+    """Read the files that are not in ``folder`` yet, for different layers; points are kept in
+    tiles of the first one."""
+    first, *further = layers
     names, reads = survey.names, folder.reads(survey)
 
     def read(path: Path) -> None:
         named = path, names[path], reads[path]
-        read_file(*named, size, chunk_points, survey.crs, further=further)
+        read_file(*named, first.voxel_size, chunk_points, survey.crs, further=further)
 
     left = [path for path, out in reads.items() if not out.exists()]
     _each(left, f"{survey.given.name}: files read", read)
@@ -148,7 +149,7 @@ def _read_files(
 
 def _predict_files(joined: SurveyWork, folder: WorkFolder, used: UsedModel) -> TilePredictions:
     """Predict the tiles of the files that are not in ``folder`` yet; each tile once."""
-    spool = joined.spool_at(used.voxel_size)
+    spool = joined.spool_at(used.layer)
     fullest = fullest_voxel(spool, used.card)
     files: list[BlockFile] = []
     done: set[int] = set()

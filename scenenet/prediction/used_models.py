@@ -14,7 +14,8 @@ from scenenet.pointcloud.targets import TOWER, WIRE, Target
 from scenenet.prediction.point_dimensions import TOWER_CODE, dimensions_of
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.tile_predictions import geneo_names
-from scenenet.prediction.work.tile_predictor import observed_voxel_size
+from scenenet.prediction.work.tile_predictor import layer_of, observed_voxel_size
+from scenenet.prediction.work.tiling import Layer
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
@@ -46,6 +47,11 @@ class UsedModel:
     def target(self) -> Target:
         """What it finds."""
         return self.card.finds
+
+    @property
+    def layer(self) -> Layer:
+        """The voxels in which it observes the survey."""
+        return layer_of(self.card, self.voxel_size)
 
 
 def finds_lines(models: Iterable[UsedModel]) -> bool:

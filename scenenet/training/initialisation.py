@@ -23,7 +23,7 @@ from torch import Tensor
 from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.convolution.observer import count_reached
 from scenenet.dataset.batches import batch
-from scenenet.dataset.voxels import Measurement, VoxelSample
+from scenenet.dataset.voxels import VoxelSample
 from scenenet.geneo import kernel_named
 from scenenet.metrics.score_columns import BETA
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
@@ -92,9 +92,7 @@ def informed_model(
     return tried[int(np.argmax(scores))]
 
 
-def _best_f05(
-    model: VoxelModel, training: Sequence[VoxelSample], measurement: Measurement
-) -> float:
+def _best_f05(model: VoxelModel, training: Sequence[VoxelSample], measurement: str) -> float:
     total = ThresholdCurve.empty()
     with torch.no_grad():
         kernel, bias = model.observer()
@@ -104,7 +102,7 @@ def _best_f05(
     return total.best()[1].decisive
 
 
-def _towards_towers(model: CNN, training: Sequence[VoxelSample], measurement: Measurement) -> CNN:
+def _towards_towers(model: CNN, training: Sequence[VoxelSample], measurement: str) -> CNN:
     kernel = discriminant(training, measurement, model.kernel_size)
     n = len(model.bias)
     with torch.no_grad():
@@ -117,7 +115,7 @@ def _towards_towers(model: CNN, training: Sequence[VoxelSample], measurement: Me
     return model
 
 
-def _best_level(kernel: Tensor, training: Sequence[VoxelSample], measurement: Measurement) -> float:
+def _best_level(kernel: Tensor, training: Sequence[VoxelSample], measurement: str) -> float:
     """The response that separates the occupied voxels with the highest F0.5."""
     answers, towers = [], []
     for sample in training:
@@ -132,9 +130,7 @@ def _best_level(kernel: Tensor, training: Sequence[VoxelSample], measurement: Me
     return float(answer[order[int(np.argmax(f05))]])
 
 
-def discriminant(
-    samples: Sequence[VoxelSample], measurement: Measurement, size: KernelSize
-) -> Tensor:
+def discriminant(samples: Sequence[VoxelSample], measurement: str, size: KernelSize) -> Tensor:
     """Fisher's linear discriminant between the surroundings of tower voxels and those of other
     occupied voxels, (kz, ky, kx): (C + s I)^-1 (m_tower - m_other), with s the mean variance.
     """
@@ -157,7 +153,7 @@ def discriminant(
 
 
 def _patches(
-    sample: VoxelSample, rows: np.ndarray, measurement: Measurement, size: KernelSize
+    sample: VoxelSample, rows: np.ndarray, measurement: str, size: KernelSize
 ) -> np.ndarray:
     """phi around occupied voxels, (R, kz * ky * kx) float32, in the alignment of a kernel."""
     low = [(k - 1) // 2 for k in size]

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from scenenet.measurement.registry import PRESENCE
 from scenenet.models.settings import (
-    MetricSettings,
+    Mixing,
     ModelSettings,
     TrainingSettings,
     TuningSettings,
@@ -69,6 +70,8 @@ def preset(
     learning_rate: float | None = None,
     geneos: Sequence[str] | None = None,
     target: Target = TOWER,
+    measurement: str = PRESENCE,
+    mixing: Mixing = "convex",
 ) -> ModelSettings:
     """The settings of a model of ``kind`` trained by ``protocol``.
 
@@ -76,18 +79,25 @@ def preset(
         epochs, learning_rate: of training by gradient; None for ``EPOCHS`` and ``LEARNING_RATES``.
         geneos: kernels of a SCENE-Net; None for those of ``OBSERVERS``, or of the thesis.
         target: what the model finds; only a model of towers gives whole towers.
+        measurement: phi of its input.
+        mixing: how the kernels of a SCENE-Net in metres become one observer.
 
     Raises:
-        ValueError: epochs or rate are given for a model that is fitted by a search, a kernel is
-            unknown, or the model has no kernels to choose.
+        ValueError: epochs or rate are given for a model that is fitted by a search, ``mixing`` for
+            one that is not, a kernel is
+            or a measurement is unknown, or the model has no kernels to choose.
     """
     chosen: dict[str, Any] = {} if geneos is None else {"geneos": tuple(geneos)}
-    chosen["target"] = target.text
+    chosen |= {"target": target.text, "measurement": measurement}
     if is_searched(kind, protocol) and not target.is_tower:
         if geneos is None and target.name in OBSERVERS:
             chosen |= OBSERVERS[target.name]
         else:
-            chosen["metric"] = MetricSettings(whole_towers=False)
+            chosen["metric"] = {"whole_towers": False}
+    if mixing != "convex":
+        if not is_searched(kind, protocol):
+            raise ValueError("only a SCENE-Net in metres has a maximum or a product of kernels")
+        chosen["metric"] = {**chosen.get("metric", {}), "mixing": mixing}
     if is_searched(kind, protocol):
         if epochs is not None or learning_rate is not None:
             raise ValueError("a search has no epochs and no learning rate")

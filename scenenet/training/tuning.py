@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scenenet.dataset.voxels import Measurement, VoxelSample
+from scenenet.dataset.voxels import VoxelSample
 from scenenet.metrics.threshold_curve import ThresholdCurve, curve_columns
 from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.base import VoxelModel
@@ -45,7 +45,7 @@ def tuned_tau(
     model: VoxelModel,
     validation: Sequence[VoxelSample],
     training: Sequence[VoxelSample],
-    measurement: Measurement,
+    measurement: str,
 ) -> tuple[float, ThresholdCurve]:
     """tau, and the scores on ``validation`` at every tau.
 

@@ -8,16 +8,15 @@ import sys
 
 import pytest
 
-from scenenet.core import provided_kernels
-from scenenet.core.provided_kernels import VARIABLE
+from scenenet.core.provided_code import KERNELS, _provided
 
 
 @pytest.fixture(autouse=True)
 def nothing_provided(monkeypatch):
     """Each test provides its own kernels."""
-    monkeypatch.setenv(VARIABLE, "")
+    monkeypatch.setenv(KERNELS.variable, "")
     yield
-    provided_kernels._provided.cache_clear()
+    _provided.cache_clear()
 
 
 def test_the_list_has_every_kernel_with_its_parameters_and_its_origin(call, tmp_path):
@@ -151,6 +150,27 @@ def test_a_trial_says_what_a_kernel_answers_to_by_class_and_where(call, pole_sur
     assert error["translation"] < 1e-5 and error["quarter_turn"] < 1e-5
     assert 0 < error["between"] < 1
     assert "xyz" not in found
+
+
+def test_a_square_of_a_survey_is_tried(call, pole_survey, monkeypatch):
+    trial = ("geneo", "try", "cylinder", pole_survey)
+    whole = json.loads(call(*trial, "--json").out)
+    assert whole["window"] is None
+    shown = call(*trial, "--at", "500025.5,4630025.5", "--window", "20")
+    assert "only the square of 20 m about (500025.50, 4630025.50)" in shown.out
+    part = json.loads(call(*trial, "--at", "500025.5,4630025.5", "--window", "20", "--json").out)
+    assert (
+        0.1 < part["points"] / whole["points"] < 0.5
+    )  # ground of 20 x 20 of 50 x 50 m, and a pole
+    assert part["places"][0]["x"] == whole["places"][0]["x"]
+    empty = call(*trial, "--at", "0,0")
+    assert empty.code == 1
+    assert "there is no point within 100 m of (0.00, 0.00)" in empty.err and "--at" in empty.err
+
+    monkeypatch.setattr("scenenet.interpretability.workbench.trial.WHOLE", 100)
+    large = json.loads(call(*trial, "--window", "5", "--json").out)
+    assert large["window"]["edge"] == 5
+    assert 0 < large["points"] < whole["points"] / 4
 
 
 def test_the_page_of_a_trial_replaces_only_a_page_of_a_trial(call, pole_survey, tmp_path):

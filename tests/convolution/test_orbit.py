@@ -27,20 +27,28 @@ def kernels(seed: int, size=(3, 5, 4), n: int = 6) -> torch.Tensor:
     return torch.from_numpy(full.astype(np.float32))
 
 
+BY_POSITION, ONE_BY_ONE = 1.0, 0.0
+"""Shares of positions that make an orbit stored by position, or convolved one by one."""
+
+
+@pytest.mark.parametrize("dense", [BY_POSITION, ONE_BY_ONE])
 @pytest.mark.parametrize("valued", [False, True])
 @pytest.mark.parametrize("size", [(3, 5, 4), (1, 1, 1), (9, 11, 13)])
-def test_it_is_the_maximum_of_the_convolutions(size, valued):
+def test_it_is_the_maximum_of_the_convolutions(size, valued, dense):
     occupancy, several = grids(1, valued), kernels(2, size)
     expected = convolve_at_voxels(occupancy, several).max(dim=0).values.numpy()
-    found = strongest_at_voxels(occupancy, Orbit.of(several))
+    orbit = Orbit.of(several, dense)
+    assert (orbit.kernels is None) == (dense == BY_POSITION)
+    found = strongest_at_voxels(occupancy, orbit)
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
 
 
-def test_it_answers_at_other_voxels():
+@pytest.mark.parametrize("dense", [BY_POSITION, ONE_BY_ONE])
+def test_it_answers_at_other_voxels(dense):
     occupancy, several = grids(3), kernels(4)
     at = np.sort(np.random.default_rng(5).choice(3 * int(np.prod(SHAPE)), 50, replace=False))
     expected = strongest(occupancy, several).reshape(-1)[torch.from_numpy(at)].numpy()
-    found = strongest_at_voxels(occupancy, Orbit.of(several), at)
+    found = strongest_at_voxels(occupancy, Orbit.of(several, dense), at)
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
 
 

@@ -8,18 +8,10 @@ import sys
 
 import pytest
 
-from scenenet.core import provided_kernels
 from scenenet.core.errors import InputError
-from scenenet.core.provided_kernels import (
-    VARIABLE,
-    faults,
-    known_kernels,
-    name_fault,
-    provide,
-    provided,
-)
+from scenenet.core.provided_code import KERNELS, _provided
 from scenenet.geneo import kernel_named, kernel_names
-from scenenet.models.kernel_records import KernelMissing
+from scenenet.models.code_records import CodeMissing
 from scenenet.models.model_file import ModelCard, is_model_file, read_model, write_model
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import ModelSettings
@@ -50,10 +42,10 @@ CARD = ModelCard(
 @pytest.fixture(autouse=True)
 def nothing_provided(monkeypatch):
     """Each test provides its own kernels."""
-    monkeypatch.setenv(VARIABLE, "")
-    provided_kernels._provided.cache_clear()
+    monkeypatch.setenv(KERNELS.variable, "")
+    _provided.cache_clear()
     yield
-    provided_kernels._provided.cache_clear()
+    _provided.cache_clear()
 
 
 @pytest.fixture
@@ -64,7 +56,7 @@ def ring(tmp_path):
 
 
 def test_a_provided_kernel_trains_like_any_other(ring):
-    provide([ring])
+    KERNELS.provide([ring])
     assert "ring" in kernel_names()
     assert ModelSettings(name="m", kind="scenenet", geneos=["cylinder", "ring"]).geneos[1] == "ring"
     model = SceneNet(["cylinder", "ring"], (5, 5, 5))
@@ -77,8 +69,8 @@ def test_the_variable_names_files_and_folders(ring, tmp_path, monkeypatch):
     folder.mkdir()
     (folder / "halo.py").write_text(RING.replace('"ring"', '"halo"'))
     (folder / "test_halo.py").write_text("raise AssertionError('a test is no kernel')")
-    monkeypatch.setenv(VARIABLE, f"{ring}{os.pathsep}{folder}")
-    assert set(provided()) == {"ring", "halo"}
+    monkeypatch.setenv(KERNELS.variable, f"{ring}{os.pathsep}{folder}")
+    assert set(KERNELS.provided()) == {"ring", "halo"}
     assert kernel_named("halo").name == "halo"
 
 
@@ -91,7 +83,7 @@ def test_the_names_of_kernels_are_known_without_running_them_and_without_torch(t
         "ModelSettings(name='m', kind='scenenet', geneos=['broken'])\n"
         "assert 'torch' not in sys.modules\n"
     )
-    environment = {**os.environ, VARIABLE: str(path)}
+    environment = {**os.environ, KERNELS.variable: str(path)}
     subprocess.run([sys.executable, "-c", code], env=environment, check=True)
 
 
@@ -118,7 +110,7 @@ def test_the_names_of_kernels_are_known_without_running_them_and_without_torch(t
 def test_a_faulty_file_is_named_with_the_place(tmp_path, text, message):
     path = tmp_path / "ring.py"
     path.write_text(text)
-    provide([path])
+    KERNELS.provide([path])
     with pytest.raises(InputError, match=message) as raised:
         kernel_named("ring")
     assert str(path) in str(raised.value)
@@ -137,15 +129,15 @@ def test_a_name_that_no_kernel_can_have_is_refused_at_once(tmp_path, name, messa
     path = tmp_path / name
     path.write_text(RING)
     with pytest.raises(InputError, match=message):
-        provide([path])
+        KERNELS.provide([path])
 
 
 def test_paths_without_a_kernel_are_refused(tmp_path):
     with pytest.raises(InputError, match="there is no such kernel file"):
-        provide([tmp_path / "missing.py"])
+        KERNELS.provide([tmp_path / "missing.py"])
     with pytest.raises(InputError, match="the folder has no kernel file"):
-        provide([tmp_path])
-    assert name_fault("a" * 40) is not None
+        KERNELS.provide([tmp_path])
+    assert KERNELS.name_fault("a" * 40) is not None
 
 
 def test_two_files_of_one_name_are_refused(ring, tmp_path):
@@ -153,12 +145,12 @@ def test_two_files_of_one_name_are_refused(ring, tmp_path):
     other = tmp_path / "b" / "ring.py"
     other.write_text(RING)
     with pytest.raises(InputError, match=r"2 kernels are called 'ring': .*ring\.py and .*ring\.py"):
-        provide([ring, other])
-    provide([ring, tmp_path / "." / "ring.py"])  # the same file twice is one kernel
+        KERNELS.provide([ring, other])
+    KERNELS.provide([ring, tmp_path / "." / "ring.py"])  # the same file twice is one kernel
 
 
 def test_an_unknown_name_lists_the_known_ones_with_the_closest(ring):
-    provide([ring])
+    KERNELS.provide([ring])
     with pytest.raises(InputError, match=r"'rng'; did you mean 'ring'\?\. Name one of: arrow, "):
         kernel_named("rng")
 
@@ -166,18 +158,18 @@ def test_an_unknown_name_lists_the_known_ones_with_the_closest(ring):
 @pytest.fixture
 def model(ring, tmp_path):
     """A model file with a kernel that is no longer provided."""
-    provide([ring])
+    KERNELS.provide([ring])
     path = tmp_path / "model.json"
     write_model(path, SceneNet(["cylinder", "ring"], (5, 5, 5)), CARD)
     read_model(path)
-    provided_kernels._provided.cache_clear()
-    os.environ[VARIABLE] = ""
+    _provided.cache_clear()
+    os.environ[KERNELS.variable] = ""
     return path
 
 
 def test_a_model_file_never_finds_its_kernel_by_itself(model, monkeypatch):
     monkeypatch.chdir(model.parent)  # where ring.py is
-    with pytest.raises(KernelMissing, match=r"needs the kernel 'ring' of the file ring\.py"):
+    with pytest.raises(CodeMissing, match=r"needs the kernel 'ring' of the file ring\.py"):
         read_model(model)
     assert is_model_file(model)
 
@@ -186,8 +178,8 @@ def test_another_kernel_of_the_name_is_refused_before_it_runs(model, tmp_path):
     (tmp_path / "b").mkdir()
     other = tmp_path / "b" / "ring.py"
     other.write_text("raise RuntimeError('this must not run')")
-    provide([other])
-    with pytest.raises(KernelMissing, match=r"and .*ring\.py is another one"):
+    KERNELS.provide([other])
+    with pytest.raises(CodeMissing, match=r"and .*ring\.py is another one"):
         read_model(model)
 
 
@@ -197,8 +189,8 @@ def test_a_model_file_without_the_digest_is_refused(model, ring):
     data = json.loads(model.read_text())
     del data["geneos"][1]["source"]
     model.write_text(json.dumps(data))
-    provide([ring])
-    with pytest.raises(KernelMissing, match="does not say which file its kernel 'ring' had"):
+    KERNELS.provide([ring])
+    with pytest.raises(CodeMissing, match="does not say which file its kernel 'ring' had"):
         read_model(model)
 
 
@@ -220,14 +212,14 @@ def package(tmp_path, monkeypatch):
     entries = "ring = rings.kernel:Ring\ncylinder = rings.kernel:Ring\nhalo = rings.kernel:Ring\n"
     (info / "entry_points.txt").write_text(f"[scenenet.geneos]\n{entries}")
     monkeypatch.syspath_prepend(site)
-    provided_kernels._provided.cache_clear()
+    _provided.cache_clear()
     yield site
     for name in ("rings", "rings.kernel"):
         sys.modules.pop(name, None)
 
 
 def test_an_installed_package_provides_a_kernel(package, tmp_path):
-    assert "ring" in known_kernels()
+    assert "ring" in KERNELS.known()
     with pytest.raises(InputError, match=r"kernel\.py: .*RuntimeError: not before it is used"):
         kernel_named("ring")
     (package / "rings" / "__init__.py").write_text("")
@@ -238,16 +230,16 @@ def test_an_installed_package_provides_a_kernel(package, tmp_path):
     with pytest.raises(InputError, match="'halo' refers to a kernel called 'ring'"):
         kernel_named("halo")
 
-    found = [str(error) for error in faults(provided(), packages=True)]
+    found = [str(error) for error in KERNELS.faults(KERNELS.provided(), packages=True)]
     assert found == [
         "rings 1.2: a kernel of the package is called 'cylinder' as well. Give the file and its "
         "kernel another name"
     ]
     assert type(kernel_named("cylinder")).__module__ == "scenenet.geneo.kernels.cylinder"
-    provide()  # a fault of a package that is not used stops nothing
+    KERNELS.provide()  # a fault of a package that is not used stops nothing
 
     metadata = package / "rings-1.2.dist-info" / "METADATA"
     metadata.write_text(metadata.read_text().replace("1.2", "1.3"))
-    provided_kernels._provided.cache_clear()
-    with pytest.raises(KernelMissing, match=r"rings 1\.2 .*, and rings 1\.3 provides it now"):
+    _provided.cache_clear()
+    with pytest.raises(CodeMissing, match=r"rings 1\.2 .*, and rings 1\.3 provides it now"):
         read_model(path)

@@ -54,7 +54,7 @@ def test_the_answer_of_one_kernel_is_its_convolution():
 
 
 def test_a_kernel_that_looks_to_one_side_is_not_equivariant(tmp_path, monkeypatch):
-    from scenenet.core.provided_kernels import VARIABLE
+    from scenenet.core.provided_code import KERNELS
 
     path = tmp_path / "east.py"
     path.write_text(
@@ -69,7 +69,7 @@ def test_a_kernel_that_looks_to_one_side_is_not_equivariant(tmp_path, monkeypatc
         "        kernel[:, :, -1] = 1.0\n"
         "        return kernel * (lattice.inside if lattice.inside is not None else 1.0)\n"
     )
-    monkeypatch.setenv(VARIABLE, str(path))
+    monkeypatch.setenv(KERNELS.variable, str(path))
     east, round_one = OneKernel("east"), OneKernel("cylinder")
     assert KernelFacts.of(east.orbit, 1.0).quarter_turn_error == 1.0
     assert measured_equivariance(east.answers, 1.0).quarter_turn > 0.1

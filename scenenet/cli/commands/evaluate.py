@@ -16,6 +16,7 @@ from scenenet.cli.options import (
     Kernels,
     LabelCodes,
     Labelled,
+    Measurements,
     MinConductor,
     ModelFile,
     Resolution,
@@ -64,6 +65,7 @@ def command(
     ] = None,
     min_conductor: MinConductor = None,
     kernels: Kernels = None,
+    measurements: Measurements = None,
     as_json: AsJson = False,
 ) -> None:
     """Score a model on labelled surveys or crops.

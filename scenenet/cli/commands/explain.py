@@ -11,6 +11,7 @@ import typer
 from scenenet.cli.options import (
     AsJson,
     Kernels,
+    Measurements,
     MinConductor,
     ModelFile,
     Overwrite,
@@ -30,6 +31,7 @@ def command(
     out: Annotated[Path, typer.Option("--out", help="Page to write (.html).")],
     min_conductor: MinConductor = None,
     kernels: Kernels = None,
+    measurements: Measurements = None,
     crs: System = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,

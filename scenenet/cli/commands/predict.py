@@ -12,6 +12,7 @@ from scenenet.cli.options import (
     AsJson,
     Codes,
     Kernels,
+    Measurements,
     MinConductor,
     ModelFiles,
     Overwrite,
@@ -54,6 +55,7 @@ def command(
     ] = None,
     min_conductor: MinConductor = None,
     kernels: Kernels = None,
+    measurements: Measurements = None,
     crs: System = None,
     classify: Annotated[
         bool,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import typer
 from pydantic import ValidationError
@@ -16,6 +16,8 @@ from scenenet.cli.options import (
     Kinds,
     LabelCodes,
     Labelled,
+    Measurements,
+    Mixings,
     Overwrite,
     Protocols,
     cube,
@@ -23,8 +25,11 @@ from scenenet.cli.options import (
     target_of,
 )
 from scenenet.cli.output import show, training_lines
+from scenenet.core.provided_code import MEASUREMENTS
 from scenenet.dataset.square_settings import SquareSettings
 from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL
+from scenenet.measurement.registry import PRESENCE
+from scenenet.models import settings
 from scenenet.models.settings import LARGEST_RATE, THESIS_GENEOS
 from scenenet.pointcloud.targets import ROLES, TOWER
 from scenenet.training import presets
@@ -76,6 +81,22 @@ Geneos = Annotated[
         f"{','.join(THESIS_GENEOS)}]",
     ),
 ]
+Mixing = Annotated[
+    Mixings,
+    typer.Option(
+        help="How the kernels of an operational SCENE-Net become one observer: their weighted sum, "
+        "the largest weighted response, or the product of their probabilities."
+    ),
+]
+MeasurementOption = Annotated[
+    str,
+    typer.Option(
+        "--measurement",
+        metavar="NAME",
+        help="What is measured in each voxel, phi, from 0 to 1: "
+        f"{', '.join(sorted(MEASUREMENTS.built_in()))}, or that of a file of --measurements.",
+    ),
+]
 TargetOption = Annotated[
     str,
     typer.Option(
@@ -124,6 +145,7 @@ Validation = Annotated[
 DEFAULT_KIND = Kinds("scenenet")
 DEFAULT_SQUARE = SquareSettings().edge
 DEFAULT_PROTOCOL = Protocols("operational")
+DEFAULT_MIXING = Mixings("convex")
 
 
 def command(
@@ -136,7 +158,10 @@ def command(
     epochs: Epochs = None,
     learning_rate: LearningRate = None,
     geneos: Geneos = None,
+    mixing: Mixing = DEFAULT_MIXING,
     kernels: Kernels = None,
+    measurements: Measurements = None,
+    measurement: MeasurementOption = PRESENCE,
     resolution: Resolution = None,
     target: TargetOption = TOWER.text,
     voxel_size: VoxelSize = None,
@@ -158,13 +183,26 @@ def command(
     ending = ".json" if kind.value == "scenenet" else ".safetensors"
     if out.suffix != ending:
         raise typer.BadParameter(f"a {kind} is written to a {ending} file", param_hint="--out")
+    if mixing.value != "convex" and not presets.is_searched(kind.value, protocol.value):
+        raise typer.BadParameter("only for an operational SCENE-Net", param_hint="--mixing")
     finds = target_of(target)
     try:
         names = None if geneos is None else [name.strip() for name in geneos.split(",")]
-        settings = presets.preset(kind.value, protocol.value, epochs, learning_rate, names, finds)
+        chosen = presets.preset(
+            kind.value,
+            protocol.value,
+            epochs,
+            learning_rate,
+            names,
+            finds,
+            measurement=measurement,
+            mixing=cast(settings.Mixing, mixing.value),
+        )
     except ValidationError as error:
-        message = error.errors()[0]["msg"].removeprefix("Value error, ")
-        raise typer.BadParameter(message, param_hint="--geneos") from None
+        fault = error.errors()[0]
+        option = "--measurement" if "measurement" in fault["loc"] else "--geneos"
+        message = fault["msg"].removeprefix("Value error, ")
+        raise typer.BadParameter(message, param_hint=option) from None
     except ValueError as error:
         option = "--epochs" if learning_rate is None else "--learning-rate"
         raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None
@@ -188,13 +226,13 @@ def command(
         labelled,
         codes.value,
         grid,
-        settings,
+        chosen,
         presets.TUNING,
         range(seeds),
         validation,
         DetectionSettings(),
         {
-            "config": digest(settings.model_dump()),
+            "config": digest(chosen.model_dump()),
             "version": package_version(),
         },
         out,

@@ -11,7 +11,7 @@ import numpy as np
 from scenenet.baselines.shape_priors import cut_out, height_above_ground
 from scenenet.convolution.coarsening import block_edge
 from scenenet.dataset.crops import Crop
-from scenenet.dataset.voxels import Measurement, VoxelSample, median_voxel_size
+from scenenet.dataset.voxels import VoxelSample, median_voxel_size
 from scenenet.evaluation.answers import Answer, Predict
 from scenenet.experiments.components.settings import (
     HIGH,
@@ -127,9 +127,7 @@ def untrained(settings: ModelSettings, known: Known, seeds: Sequence[int]) -> li
     return [everywhere, published, *drawn]
 
 
-def _tuned(
-    name: str, seed: int, model: VoxelModel, measurement: Measurement, known: Known
-) -> Source:
+def _tuned(name: str, seed: int, model: VoxelModel, measurement: str, known: Known) -> Source:
     """A model as it is, with tau chosen as for a trained one."""
     others = known.training if known.validation else ()
     tau, _ = tuned_tau(model, known.validation or known.training, others, measurement)
@@ -137,7 +135,7 @@ def _tuned(
     return Source(name, seed, _predict(model, measurement), tau, size, model.n_parameters())
 
 
-def _predict(model: VoxelModel, measurement: Measurement) -> Predict:
+def _predict(model: VoxelModel, measurement: str) -> Predict:
     return lambda sample: probabilities(model, sample, measurement)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import torch
 
 from scenenet.core.errors import InputError
-from scenenet.core.provided_kernels import faults, provided, source_named
+from scenenet.core.provided_code import KERNELS
 from scenenet.geneo import GeneoKernel, ShapeParameter, kernel_named, kernel_names
 from scenenet.geneo.sentences import Reference
 from scenenet.interpretability.geneo_properties import ROUNDING
@@ -131,7 +131,7 @@ def describe(name: str) -> KernelDescription:
         InputError: there is none, or its file fails.
     """
     kernel = kernel_named(name)
-    source = source_named(name)
+    source = KERNELS.source_named(name)
     return KernelDescription(
         name=name,
         answers_to=_first_sentence(kernel),
@@ -146,7 +146,7 @@ def describe(name: str) -> KernelDescription:
 
 def describe_all() -> tuple[list[KernelDescription], list[InputError]]:
     """All kernels in alphabetical order, and why others cannot be used."""
-    errors = list(faults(provided(), packages=True))
+    errors = list(KERNELS.faults(KERNELS.provided(), packages=True))
     found = []
     for name in kernel_names():
         try:

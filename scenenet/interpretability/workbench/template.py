@@ -7,7 +7,7 @@ from pathlib import Path
 from scenenet.core.errors import InputError
 from scenenet.core.files import write_text
 from scenenet.core.outputs import Output, check_outputs
-from scenenet.core.provided_kernels import known_kernels, name_fault
+from scenenet.core.provided_code import KERNELS
 
 KERNEL = '''\
 """A thin vertical column with nothing around it: say here what CLASS answers to."""
@@ -121,12 +121,12 @@ def write_template(name: str, folder: Path, *, overwrite: bool = False) -> tuple
         InputError: the name cannot be that of a kernel, or there is a kernel of this name.
         OutputError: a file that exists would be replaced.
     """
-    if fault := name_fault(name):
+    if fault := KERNELS.name_fault(name):
         raise InputError(f"{name!r} cannot be the name of a kernel: it {fault}")
     paths = folder / f"{name}.py", folder / f"test_{name}.py"
     title = "".join(part.capitalize() for part in name.split("_"))
     texts = tuple(text.replace("NAME", name).replace("CLASS", title) for text in (KERNEL, TEST))
-    if name in known_kernels():
+    if name in KERNELS.known():
         raise InputError(f"there is a kernel called {name!r} already", remedy="Choose another name")
     planned = [
         Output(path, lambda there, text=text: _reads(there, text))  # type: ignore[misc]

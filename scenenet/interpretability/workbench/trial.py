@@ -15,6 +15,13 @@ from scenenet.interpretability.workbench.description import KernelFacts, Paramet
 from scenenet.interpretability.workbench.description import parameters_of as described
 from scenenet.interpretability.workbench.moved_scenes import Equivariance, measured_equivariance
 from scenenet.interpretability.workbench.one_kernel import OneKernel
+from scenenet.interpretability.workbench.window import (
+    WHOLE,
+    WINDOW_M,
+    Window,
+    middle_of,
+    points_in,
+)
 from scenenet.pointcloud import PointCloud, read, survey_in_metres
 from scenenet.pointcloud.class_schemes import SCHEMES
 
@@ -70,6 +77,7 @@ class Trial:
         kernel, survey: names.
         voxel_size: m.
         points, voxels: numbers of points and of occupied voxels.
+        window: the square of the survey that was read; None for all of it.
         parameters: with the values that were tried.
         facts: of the sampled kernel.
         equivariance: measured on a generated scene, which is the same for every kernel.
@@ -83,6 +91,7 @@ class Trial:
     voxel_size: float
     points: int
     voxels: int
+    window: Window | None
     parameters: tuple[ParameterDescription, ...]
     facts: KernelFacts
     equivariance: Equivariance
@@ -93,17 +102,29 @@ class Trial:
     responses: np.ndarray
 
 
-def try_kernel(chosen: OneKernel, survey: str | Path, codes: str | None = None) -> Trial:
-    """Convolve a survey with a kernel; the whole survey is in memory.
+def try_kernel(
+    chosen: OneKernel,
+    survey: str | Path,
+    codes: str | None = None,
+    window: Window | None = None,
+    edge: float = WINDOW_M,
+) -> Trial:
+    """Convolve a survey, or a square of it, with a kernel; the points of the square are in memory.
 
     Args:
         codes: class scheme of the labels, for the names of the classes; None if it is not known.
+        window: the square; None for the whole survey, or, if it has more than ``WHOLE`` points, for
+            one about the point in the middle of the file.
+        edge: m, of this square.
 
     Raises:
-        InputError: the survey cannot be used, has no points, or is too large for the voxels.
+        InputError: the survey cannot be used, has no points in the square, or is too large for the
+            voxels.
     """
-    survey_in_metres(survey)
-    cloud = read(survey, codes)
+    n_points = survey_in_metres(survey).n_points
+    if window is None and n_points > WHOLE:
+        window = Window(*middle_of(survey, n_points), edge)
+    cloud = read(survey, codes) if window is None else points_in(survey, window, codes)
     with in_file(survey):
         grid = VoxelGrid.on_map(cloud.xyz, chosen.voxel_size)
     at = grid.voxel_of(cloud.xyz)
@@ -119,6 +140,7 @@ def try_kernel(chosen: OneKernel, survey: str | Path, codes: str | None = None) 
         voxel_size=chosen.voxel_size,
         points=len(cloud),
         voxels=len(index),
+        window=window,
         parameters=described(chosen),
         facts=KernelFacts.of(chosen.orbit, chosen.voxel_size),
         equivariance=measured_equivariance(chosen.answers, chosen.voxel_size),

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from scenenet.core.errors import InputError
+from scenenet.measurement.registry import measurement_named
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.survey_work import belonging
 from scenenet.prediction.work.tile_predictor import (
@@ -57,7 +58,7 @@ def predict_tile(
 
     trained, card = read_model(model)
     own = WorkFile.open(work)
-    needed = needed_around(trained, own.lattice.voxel_size)
+    needed = needed_around(trained, card, own.lattice.voxel_size)
     if needed > within:
         raise InputError(
             f"voxels of {own.lattice.voxel_size:g} m need the tiles within {needed:.0f} m, and the "
@@ -66,9 +67,18 @@ def predict_tile(
             remedy="Set predict.voxel_size to a smaller value, or predict the survey with "
             "scenenet predict",
         )
-    if card.measurement == "density" and fullest is None:
+    measurement = measurement_named(card.measurement)
+    if "fullest" in measurement.needs and fullest is None:
         raise InputError(
-            "the model measures density, which its training settings do not say", file=model
+            f"the model measures {card.measurement}, which its training settings do not say",
+            file=model,
+        )
+    if measurement.fields:
+        raise InputError(
+            f"the model measures {card.measurement}, and the workflow does not read "
+            f"{' and '.join(measurement.fields)}",
+            file=model,
+            remedy="Predict the survey with scenenet predict",
         )
     near = [own, *map(WorkFile.open, neighbours)]
     same = [] if own.system is None else list(belonging(near, own.system))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scenenet.prediction.file_status import SurveyFile, readable
 from scenenet.prediction.survey_files import SurveyFiles, in_other_system, nothing_to_use
-from scenenet.prediction.work.tiling import Lattice, TileSpool, further_voxels
+from scenenet.prediction.work.tiling import Lattice, Layer, TileSpool
 from scenenet.prediction.work.work_file import SurveySystem, WorkFile
 
 
@@ -59,13 +59,13 @@ class SurveyWork:
         spool = TileSpool(used[0].lattice, (work.blocks for work in used))
         return cls(survey, files, used, system, spool)
 
-    def spool_at(self, voxel_size: float) -> TileSpool:
-        """The voxels of another size, m, of all ``used``; the file was read for them too
+    def spool_at(self, layer: Layer) -> TileSpool:
+        """The voxels of another layer, of all ``used``; the files were read for it too
         (``read_file``)."""
-        if voxel_size == self.spool.voxel_size:
+        if layer == Layer(self.spool.voxel_size):
             return self.spool
         blocks = (work.blocks for work in self.used)
-        return TileSpool(Lattice(voxel_size), blocks, further_voxels(voxel_size))
+        return TileSpool(Lattice(layer.voxel_size), blocks, layer)
 
 
 def belonging(works: Iterable[WorkFile], system: SurveySystem) -> Iterator[WorkFile]:

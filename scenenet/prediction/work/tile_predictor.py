@@ -10,14 +10,16 @@ import numpy as np
 
 from scenenet.core.files import atomic
 from scenenet.core.progress import track
+from scenenet.dataset.voxel_measures import VoxelMeasures
+from scenenet.measurement.heights import columns_around
+from scenenet.measurement.registry import PRESENCE, measurement_named
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.block_file import BlockWriter
 from scenenet.prediction.work.tile_predictions import PREDICTED_KINDS, TilePrediction, geneo_names
-from scenenet.prediction.work.tiling import EDGE, Tile, TileSpool, code_of
+from scenenet.prediction.work.tiling import EDGE, Layer, Tile, TileSpool, code_of
 from scenenet.prediction.work.work_file import WorkFile
 
 if TYPE_CHECKING:
-    from scenenet.dataset.voxels import Measurement
     from scenenet.models.base import VoxelModel
     from scenenet.models.model_file import ModelCard
 
@@ -72,18 +74,29 @@ def observed_voxel_size(model: VoxelModel, card: ModelCard, settings: PredictSet
     return model.observed_size(settings.voxel_size or card.voxel_size)
 
 
-def needed_around(model: VoxelModel, voxel_size: float) -> float:
+def layer_of(card: ModelCard, voxel_size: float) -> Layer:
+    """The voxels of ``voxel_size`` m in which a model observes a survey."""
+    needs_points = bool(measurement_named(card.measurement).fields)
+    return Layer(voxel_size, card.measurement if needs_points else "")
+
+
+def needed_around(model: VoxelModel, card: ModelCard, voxel_size: float) -> float:
     """m around the points of a file within which all other files must be in the spool: a tile of
-    voxels reaches beyond the file, and its halo beyond the tile."""
-    return (EDGE + max(model.at(voxel_size).reach[1:])) * voxel_size
+    voxels reaches beyond the file, its halo beyond the tile, and the ground below a voxel beyond
+    the halo."""
+    reach = max(model.at(voxel_size).reach[1:])
+    if "height" in measurement_named(card.measurement).needs:
+        reach += columns_around(voxel_size)
+    return (EDGE + reach) * voxel_size
 
 
 def fullest_voxel(spool: TileSpool, card: ModelCard) -> int:
-    """Points in the fullest voxel of the survey, for a model that measures density; 1 for others.
+    """Points in the fullest voxel of the survey, for a model whose measurement needs it; 1 for
+    others.
 
     There is one number for the whole survey: one for each tile would show as seams.
     """
-    if card.measurement != "density":
+    if "fullest" not in measurement_named(card.measurement).needs:
         return 1
     return max((int(tile.count.max()) for tile in spool.tiles()), default=1)
 
@@ -92,19 +105,19 @@ class TilePredictor:
     """A model at the voxel size of a survey. Its kernels are sampled once, for all tiles."""
 
     def __init__(
-        self, model: VoxelModel, measurement: Measurement, voxel_size: float, fullest: int
+        self, model: VoxelModel, measurement: str, voxel_size: float, fullest: int
     ) -> None:
         """Sample the kernels.
 
         Args:
             measurement: of the model (``ModelCard``).
             voxel_size: m.
-            fullest: points in the fullest voxel of the survey, for measurement ``density``.
+            fullest: points in the fullest voxel of the survey (``fullest_voxel``).
         """
         import torch
 
         self.model = model.at(voxel_size)
-        self._fullest = fullest if measurement == "density" else None
+        self._measurement, self._fullest = measurement, fullest
         with torch.no_grad():
             self._responses = self.model.responder()
 
@@ -125,8 +138,8 @@ class TilePredictor:
         shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
         scenes = [spool.around(tile.place, reach) for tile in tiles]
         phi = None
-        if self._fullest is not None:
-            phi = [(scene.count / self._fullest).astype(np.float32) for scene in scenes]
+        if self._measurement != PRESENCE:
+            phi = [self._phi(spool, scene, reach) for scene in scenes]
         occupancy = Occupancy.of_grids([scene.voxel for scene in scenes], phi, shape)
         inner = np.concatenate([
             first + _inner(scene.voxel, shape, reach)
@@ -144,6 +157,17 @@ class TilePredictor:
             probability = torch.relu(torch.tanh(observed)).numpy()
         ends = np.cumsum([len(tile.voxel) for tile in tiles])[:-1]
         return list(zip(np.split(probability, ends), np.split(shares, ends), strict=True))
+
+    def _phi(self, spool: TileSpool, scene: Tile, reach: tuple[int, int, int]) -> np.ndarray:
+        """The measurement at the voxels (M,) of a tile with its halo."""
+        shape = [EDGE + 2 * r for r in reach]
+        corner = np.array(scene.place) * EDGE - reach
+        zyx, around = np.stack(np.unravel_index(scene.voxel, shape), axis=1) + corner, None
+        if "height" in measurement_named(self._measurement).needs:
+            beyond = columns_around(spool.voxel_size)
+            around = spool.columns_around(scene.place, (reach[1] + beyond, reach[2] + beyond))
+        known = (scene.count, scene.total, spool.voxel_size, around, self._fullest)
+        return VoxelMeasures(zyx, *known).phi(self._measurement)
 
 
 def _together(tiles: Iterable[Tile]) -> Iterator[list[Tile]]:

@@ -7,9 +7,10 @@ coordinates. The prediction of a tile is therefore the same wherever a survey is
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
+from types import MappingProxyType
 
 import numpy as np
 
@@ -26,20 +27,35 @@ NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)))
 _BITS = 21
 _BIAS = 1 << (_BITS - 1)
 _SPOOLED = np.dtype([("voxel", "<i4"), ("count", "<i4")])
+_MEASURED = np.dtype([("voxel", "<i4"), ("count", "<i4"), ("total", "<i8")])
 _OFFSET = np.dtype("<f4")
 
 SPOOLED_KINDS = VOXELS, POINTS = ("voxels", "points")
 """Blocks of each tile: its occupied voxels, and its points."""
 
 
-def spooled_kinds(further: Iterable[float]) -> tuple[str, ...]:
-    """The kinds of blocks of a survey that is in voxels of ``further`` sizes (m) too."""
-    return (*SPOOLED_KINDS, *map(further_voxels, further))
+@dataclass(frozen=True)
+class Layer:
+    """Voxels in which a model observes a survey.
+
+    Attributes:
+        voxel_size: m.
+        measurement: what is summed up over the points of each voxel; empty where the numbers of
+            points are enough.
+    """
+
+    voxel_size: float
+    measurement: str = ""
+
+    @property
+    def kind(self) -> str:
+        """The kind of its blocks, besides those of ``SPOOLED_KINDS``."""
+        return f"{VOXELS} {self.voxel_size!r} {self.measurement}".rstrip()
 
 
-def further_voxels(voxel_size: float) -> str:
-    """The kind of the blocks with the occupied voxels of a further size, m."""
-    return f"{VOXELS} {voxel_size!r}"
+def spooled_kinds(further: Iterable[Layer]) -> tuple[str, ...]:
+    """The kinds of blocks of a survey that is in ``further`` layers too."""
+    return (*SPOOLED_KINDS, *(layer.kind for layer in further))
 
 
 @dataclass(frozen=True)
@@ -50,11 +66,14 @@ class Tile:
         place: (z, y, x) number of the tile.
         voxel: (M,) int32 flat C-order [z, y, x] positions within the tile, ascending.
         count: (M,) int32 number of points in each voxel.
+        total: (M,) int64, the sum of ``Measurement.point_steps`` over its points; None where the
+            layer has no measurement.
     """
 
     place: tuple[int, int, int]
     voxel: np.ndarray
     count: np.ndarray
+    total: np.ndarray | None = None
 
     def zyx(self) -> np.ndarray:
         """(M, 3) int64 positions on the lattice."""
@@ -114,31 +133,35 @@ class SpoolWriter:
     """Writes the occupied voxels and the points of a file of a survey, tile by tile."""
 
     def __init__(
-        self, blocks: BlockWriter, lattice: Lattice, further: Iterable[float] = ()
+        self, blocks: BlockWriter, lattice: Lattice, further: Iterable[Layer] = ()
     ) -> None:
         """Add points to ``blocks``, which has the kinds of ``spooled_kinds``.
 
         Args:
-            further: further sizes of voxels, m, for models that observe other ones.
+            further: further layers, for models that observe other voxels or measure other things.
         """
         self._blocks, self.lattice = blocks, lattice
-        self._further = {further_voxels(size): Lattice(size) for size in further}
+        self._further = tuple(further)
 
-    def add(self, xyz: np.ndarray) -> None:
+    def add(self, xyz: np.ndarray, steps: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
         """Add points (n, 3) m to their tiles.
+
+        Args:
+            steps: (n,) what the measurement of each layer says about them, by its name.
 
         Raises:
             InputError: a coordinate is outside the lattice.
         """
-        for code, rows in self._add_voxels(VOXELS, self.lattice, xyz):
+        for code, rows in self._add_voxels(VOXELS, self.lattice, xyz, None):
             offset = xyz[rows] - self.lattice.corner(code)
             self._blocks.add(POINTS, code, offset.astype(_OFFSET))
-        for kind, lattice in self._further.items():
-            for _ in self._add_voxels(kind, lattice, xyz):
+        for layer in self._further:
+            lattice, values = Lattice(layer.voxel_size), steps.get(layer.measurement)
+            for _ in self._add_voxels(layer.kind, lattice, xyz, values):
                 pass
 
     def _add_voxels(
-        self, kind: str, lattice: Lattice, xyz: np.ndarray
+        self, kind: str, lattice: Lattice, xyz: np.ndarray, steps: np.ndarray | None
     ) -> Iterator[tuple[int, np.ndarray]]:
         """Add the voxels of points (n, 3) m; each tile, with its rows, once its voxels are added.
 
@@ -148,8 +171,10 @@ class SpoolWriter:
         codes, voxels = lattice.locate(xyz)
         for code, rows in groups(codes):
             voxel, count = np.unique(voxels[rows], return_counts=True)
-            records = np.empty(len(voxel), _SPOOLED)
+            records = np.zeros(len(voxel), _SPOOLED if steps is None else _MEASURED)
             records["voxel"], records["count"] = voxel, count
+            if steps is not None:
+                np.add.at(records["total"], np.searchsorted(voxel, voxels[rows]), steps[rows])
             self._blocks.add(kind, code, records)
             yield code, rows
 
@@ -162,19 +187,26 @@ class TileSpool:
         kind: of their blocks.
     """
 
-    def __init__(self, lattice: Lattice, files: Iterable[BlockFile], kind: str = VOXELS) -> None:
+    def __init__(
+        self, lattice: Lattice, files: Iterable[BlockFile], further: Layer | None = None
+    ) -> None:
         """Look at the files.
 
         Args:
             files: written by ``SpoolWriter`` on the same lattice. Their order does not matter.
-            kind: of the blocks with the voxels (``further_voxels``). Only those of ``VOXELS`` come
-                with points.
+            further: the layer with the voxels, on the same lattice; None for those that come with
+                points.
         """
-        self.lattice, self.kind = lattice, kind
+        self.lattice = lattice
+        self.kind = VOXELS if further is None else further.kind
+        self._measured = further is not None and bool(further.measurement)
         self._files: dict[int, list[BlockFile]] = defaultdict(list)
         for file in files:
-            for code in file.codes(kind):
+            for code in file.codes(self.kind):
                 self._files[code].append(file)
+        self._columns: dict[tuple[int, int], list[int]] = defaultdict(list)
+        for code in sorted(self._files):
+            self._columns[_decode(code)[1:]].append(code)
 
     @property
     def voxel_size(self) -> float:
@@ -195,10 +227,13 @@ class TileSpool:
 
     def tile(self, code: int) -> Tile:
         """The tile with ``code``; a tile without voxels if it holds no point."""
-        records = self._read(self.kind, code, _SPOOLED)
+        records = self._read(self.kind, code, _MEASURED if self._measured else _SPOOLED)
         voxel, inverse = np.unique(records["voxel"], return_inverse=True)
-        count = np.bincount(inverse, weights=records["count"])
-        return Tile(_decode(code), voxel, count.astype(np.int32))
+        count, total = np.bincount(inverse, weights=records["count"]), None
+        if self._measured:
+            total = np.zeros(len(voxel), np.int64)
+            np.add.at(total, inverse, records["total"])
+        return Tile(_decode(code), voxel, count.astype(np.int32), total)
 
     def points(self, code: int) -> np.ndarray:
         """(n, 3) m, points of the tile with ``code``, to a few micrometres, in a fixed order.
@@ -225,7 +260,7 @@ class TileSpool:
             raise ValueError(f"a halo of {reach} voxels is larger than a tile of {EDGE}")
         low = np.asarray(place) * EDGE - reach
         shape = np.array([EDGE + 2 * r for r in reach])
-        indices, counts = [], []
+        indices, counts, totals = [], [], []
         for code in _encode(np.asarray(place) + NEIGHBOURS).tolist():
             if code not in self._files:
                 continue
@@ -234,10 +269,31 @@ class TileSpool:
             inside = ((zyx >= 0) & (zyx < shape)).all(axis=1)
             indices.append(np.ravel_multi_index(tuple(zyx[inside].T), tuple(shape)))
             counts.append(tile.count[inside])
+            if tile.total is not None:
+                totals.append(tile.total[inside])
         index = np.concatenate([*indices, np.empty(0, np.int64)])
         count = np.concatenate([*counts, np.empty(0, np.int32)])
         order = np.argsort(index, kind="stable")
-        return Tile(place, index[order].astype(np.int32), count[order])
+        total = np.concatenate([*totals, np.empty(0, np.int64)])[order] if self._measured else None
+        return Tile(place, index[order].astype(np.int32), count[order], total)
+
+    def columns_around(self, place: tuple[int, int, int], reach: tuple[int, int]) -> np.ndarray:
+        """(K, 3) zyx on the lattice, all occupied voxels below, in and above a tile, and up to
+        ``reach`` (y, x) voxels beside it.
+
+        Raises:
+            ValueError: the reach is larger than a tile.
+        """
+        if max(reach) > EDGE:
+            raise ValueError(f"columns {reach} voxels away are beyond the next tile of {EDGE}")
+        low = np.array(place[1:]) * EDGE - reach
+        high = low + EDGE + 2 * np.array(reach)
+        found = [np.empty((0, 3), np.int64)]
+        for y, x in product((-1, 0, 1), repeat=2):
+            for code in self._columns.get((place[1] + y, place[2] + x), ()):
+                zyx = self.tile(code).zyx()
+                found.append(zyx[((zyx[:, 1:] >= low) & (zyx[:, 1:] < high)).all(axis=1)])
+        return np.concatenate(found)
 
     def centres(self, zyx: np.ndarray) -> np.ndarray:
         """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""

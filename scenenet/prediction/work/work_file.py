@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,13 +12,14 @@ from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.core.provenance import is_still
 from scenenet.core.unchanged import FileState, unchanged
+from scenenet.measurement.registry import measurement_named
 from scenenet.pointcloud import iter_chunks
 from scenenet.pointcloud.quality.screening import Screening
 from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
 from scenenet.prediction.work.survey_system import SurveySystem, in_metres
-from scenenet.prediction.work.tiling import Lattice, SpoolWriter, spooled_kinds
+from scenenet.prediction.work.tiling import Lattice, Layer, SpoolWriter, spooled_kinds
 
 if TYPE_CHECKING:
     import pyproj
@@ -121,7 +122,7 @@ def read_file(
     chunk_points: int,
     crs: pyproj.CRS | None = None,
     planned: PlannedFile | None = None,
-    further: Sequence[float] = (),
+    further: Sequence[Layer] = (),
 ) -> SurveyFile:
     """Read a survey file into a work file. Memory is bounded by a chunk of points.
 
@@ -135,7 +136,7 @@ def read_file(
         chunk_points: points read at once.
         crs: system of a file that states none; None if it is not known.
         planned: what another process expects of the file; None if nothing was expected.
-        further: further sizes of voxels, m, for models that observe other ones.
+        further: further layers of voxels, for models that observe other ones.
 
     Raises:
         OutputError: the work file cannot be written.
@@ -148,7 +149,7 @@ def read_file(
                 planned.require_same(path)
             info = survey_of_lengths(path, crs)
             system = SurveySystem.of(info)
-            file = _read(path, info, SpoolWriter(blocks, lattice, further), chunk_points)
+            file = _read(path, info, SpoolWriter(blocks, lattice, further), chunk_points, further)
             file = replace(file, name=name)
             if planned is not None:
                 planned.require_inside(file, info)
@@ -165,15 +166,26 @@ def read_file(
     return file
 
 
-def _read(path: Path, info: SurveyInfo, spool: SpoolWriter, chunk_points: int) -> SurveyFile:
-    """Read a file into ``spool``, and look at it."""
+def _read(
+    path: Path, info: SurveyInfo, spool: SpoolWriter, chunk_points: int, further: Iterable[Layer]
+) -> SurveyFile:
+    """Read a file into ``spool``, which has ``further`` layers, and look at it."""
+    measurements = {
+        layer.measurement: measurement_named(layer.measurement)
+        for layer in further
+        if layer.measurement
+    }
+    wanted = list(dict.fromkeys(f for measured in measurements.values() for f in measured.fields))
     screening, n_points, state = Screening(info, converted=True), 0, FileState.of(path)
     with unchanged(state), in_file(path):
-        chunks = iter_chunks(path, chunk_points=chunk_points)
+        chunks = iter_chunks(path, chunk_points=chunk_points, fields=wanted)
         total = -(-info.n_points // chunk_points)
         for chunk in track(chunks, f"{path.name}: chunks read", total):
             screening.add(chunk.xyz, chunk.classification)
-            spool.add(in_metres(chunk.xyz, info.unit_sizes))
+            steps = {}
+            if chunk.fields is not None:
+                steps = {name: m.point_steps(chunk.fields) for name, m in measurements.items()}
+            spool.add(in_metres(chunk.xyz, info.unit_sizes), steps)
             n_points += len(chunk)
     screening.raise_if_not_metres()
     extent = (*screening.mins[:2].tolist(), *screening.maxs[:2].tolist()) if n_points else None

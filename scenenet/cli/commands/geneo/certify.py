@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from scenenet.cli.options import AsJson, Kernels, ModelFile
+from scenenet.cli.options import AsJson, Kernels, Measurements, ModelFile
 from scenenet.cli.output import show
 
 if TYPE_CHECKING:
@@ -13,7 +13,12 @@ if TYPE_CHECKING:
 EXAMPLES = ("scenenet geneo certify --model model.json",)
 
 
-def command(model: ModelFile, kernels: Kernels = None, as_json: AsJson = False) -> None:
+def command(
+    model: ModelFile,
+    kernels: Kernels = None,
+    measurements: Measurements = None,
+    as_json: AsJson = False,
+) -> None:
     """Verify which GENEO properties a model has, by calculation and measurement.
 
     The exit code is 0 whether the properties hold or not.

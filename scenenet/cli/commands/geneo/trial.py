@@ -22,6 +22,7 @@ from scenenet.cli.commands.geneo.options import (
 )
 from scenenet.cli.options import AsJson, Codes, Kernels, Overwrite
 from scenenet.cli.output import show
+from scenenet.interpretability.workbench.window import WHOLE, WINDOW_M, Window
 from scenenet.pointcloud.class_schemes import difference
 
 if TYPE_CHECKING:
@@ -50,14 +51,26 @@ def command(
     out: Annotated[
         Path | None, typer.Option("--out", help="Page with pictures to write (.html).")
     ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y",
+            help="Middle of a square of the survey, in its coordinates; only the square is tried. "
+            f"Without it a survey of more than {WHOLE:,} points is tried about the point in the "
+            "middle of the file.",
+        ),
+    ] = None,
+    window: Annotated[
+        float, typer.Option(min=1, max=1e4, help="Edge of this square in m.")
+    ] = WINDOW_M,
     kernels: Kernels = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Try a kernel on a survey: what it answers to, by class, and where it answers most.
 
-    The answer is the response of the kernel alone at each occupied voxel, before any training. The
-    survey is held in memory at once.
+    The answer is the response of the kernel alone at each occupied voxel, before any training. Of a
+    large survey it is a square (--at, --window), and the output says which.
 
     Its equivariance is measured on a generated scene, the same for every kernel. A page that exists
     is replaced only if this command wrote it.
@@ -74,7 +87,8 @@ def command(
 
         check_outputs([Output(out, is_trial)], [survey], overwrite=overwrite)
     chosen = sampled(name, values, voxel_size, radius, above, below)
-    trial = try_kernel(chosen, survey, None if codes is None else codes.value)
+    square = None if at is None else Window(*_place(at), window)
+    trial = try_kernel(chosen, survey, None if codes is None else codes.value, square, window)
     if out is not None:
         from scenenet.report.trial_page import write_trial_page
 
@@ -82,10 +96,29 @@ def command(
     show(_plain(trial), as_json, lambda _: _lines(trial, out))
 
 
+def _place(text: str) -> tuple[float, float]:
+    """x and y of ``--at``.
+
+    Raises:
+        typer.BadParameter: it is no pair of numbers.
+    """
+    try:
+        x, y = map(float, text.split(","))
+    except ValueError:
+        raise typer.BadParameter("give two numbers: 530100,4630200", param_hint="--at") from None
+    return x, y
+
+
 def _plain(trial: Trial) -> dict[str, Any]:
     """A trial without its points."""
     arrays = ("xyz", "codes", "responses")
     return {name: value for name, value in asdict(trial).items() if name not in arrays}
+
+
+def _square(trial: Trial) -> list[str]:
+    if (w := trial.window) is None:
+        return []
+    return [f"only the square of {w.edge:g} m about ({w.x:.2f}, {w.y:.2f})"]
 
 
 def _lines(trial: Trial, out: Path | None) -> list[str]:
@@ -96,6 +129,7 @@ def _lines(trial: Trial, out: Path | None) -> list[str]:
     lines = [
         f"{trial.kernel} ({values or 'no parameters'}) on {trial.survey}: {trial.points:,} points "
         f"in {trial.voxels:,} voxels of {trial.voxel_size:g} m",
+        *_square(trial),
         f"equivariance error: shifts {e.translation:.1e}, quarter turns {e.quarter_turn:.1e} of "
         f"the largest response; {e.between_degrees:g} degrees {e.between:.2f} of its spread "
         f"(half a voxel: {e.half_voxel:.2f})",

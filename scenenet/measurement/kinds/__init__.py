@@ -1,0 +1,1 @@
+"""One file for each measurement. The registry imports every file in this package."""

@@ -34,6 +34,20 @@ def targets() -> str:
     return markdown()
 
 
+def measurements() -> str:
+    """Every measurement of the package."""
+    from scenenet.core.provided_code import MEASUREMENTS
+    from scenenet.measurement import measurement_named
+    from scenenet.pointcloud.point_fields import TITLES
+
+    lines = ["| measurement | phi of a voxel | the file must have |", "|---|---|---|"]
+    for name in sorted(MEASUREMENTS.built_in()):
+        measurement = measurement_named(name)
+        said = " ".join((measurement.__doc__ or "").split()).removeprefix("phi = ").rstrip(".")
+        lines.append(f"| `{name}` | {said} | {', '.join(TITLES[f] for f in measurement.fields)} |")
+    return "\n".join(lines)
+
+
 def scores() -> str:
     """Every score that the tables report."""
     from scenenet.metrics.score_columns import SCORE_COLUMNS
@@ -44,6 +58,7 @@ def scores() -> str:
 TABLES: Mapping[str, Callable[[], str]] = {
     "class schemes": class_schemes,
     "targets": targets,
+    "measurements": measurements,
     "scores": scores,
     "tower list": tower_list,
 }

@@ -28,9 +28,10 @@ def orbits(crops: list[PointCloud], repetitions: int = 7) -> dict[str, Any]:
 
     Returns:
         by kernel: filled, share of positions that are not zero; ours_ms, the maximum over its
-        orbit; by_position_ms, the same stored by position, whatever is faster; one_ms, one kernel of the orbit;
-        one_full_ms, a kernel of the same size without zeros; each_ms, all kernels one after the
-        other, extrapolated from one; difference, of the maximum from that of the single kernels.
+        orbit; by_position_ms, the same stored by position, whatever is faster; one_ms, one kernel
+        of the orbit; one_full_ms, a kernel of the same size without zeros; each_ms, all kernels
+        one after the other, extrapolated from one; difference, of the maximum from that of the
+        single kernels.
     """
     grid = VoxelGrid.metric(crops[0].xyz, VOXEL)
     occupancy, _ = batch([voxelise(crops[0], grid, "0")], "presence")

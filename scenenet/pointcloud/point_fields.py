@@ -20,6 +20,9 @@ PointField = Literal["intensity", "returns"]
 """What may be asked for: the intensity; number of the return and number of returns of its pulse."""
 FIELDS: tuple[PointField, ...] = get_args(PointField)
 
+TITLES: dict[PointField, str] = {"intensity": "intensity", "returns": "numbers of returns"}
+"""The fields in words."""
+
 _ARRAYS: dict[PointField, tuple[str, ...]] = {
     "intensity": ("intensity",),
     "returns": ("return_number", "number_of_returns"),
@@ -110,9 +113,8 @@ def array_types(wanted: Sequence[PointField]) -> dict[str, type[np.generic]]:
 
 def missing_field(path: str | Path, field: PointField) -> InputError:
     """That a file does not have a field."""
-    what = {"intensity": "intensity", "returns": "numbers of returns"}[field]
     return InputError(
-        f"it has no {what}, which the measurement of the model needs",
+        f"it has no {TITLES[field]}, which the measurement of the model needs",
         file=path,
         remedy="Use a survey that has them, or a model with measurement presence",
     )

@@ -22,6 +22,9 @@ HALVINGS = 3
 WEIGHTS = 1e-3, 0.999
 """Mixing weights between which the score is measured."""
 
+NOTHING = 1e-5
+"""Sum of mixing weights that is rounding."""
+
 
 def evidence(
     model: MetricSceneNet, measured: Mapping[str, Measured], score: Callable[[], float]
@@ -103,9 +106,11 @@ def _changed(values: Mapping[str, float], label: str, value: float) -> dict[str,
     changed = dict(values)
     prefix, found, _ = label.rpartition("lambda.")
     if found:
+        own = [n for n in values if n.startswith(f"{prefix}lambda.") and n != label]
         others = 1 - values[label]
-        for other in values:
-            if other.startswith(f"{prefix}lambda.") and others > 0:
-                changed[other] *= (1 - value) / others
+        for other in own:
+            # Next to nothing is left for the others: their ratios are rounding.
+            few = others < NOTHING
+            changed[other] = (1 - value) / len(own) if few else values[other] * (1 - value) / others
     changed[label] = value
     return changed

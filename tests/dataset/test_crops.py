@@ -74,7 +74,9 @@ def test_crops_do_not_depend_on_the_chunks_a_survey_is_read_in(field, tmp_path, 
     (tmp_path / "small").mkdir()
     whole, _ = cut(field[0], towers, tmp_path)
     monkeypatch.setattr(
-        crops_module, "iter_chunks", lambda path, codes, truth: iter_chunks(path, codes, 137, truth)
+        crops_module,
+        "iter_chunks",
+        lambda path, codes, truth, fields: iter_chunks(path, codes, 137, truth, fields),
     )
     pieces, _ = cut(field[0], towers, tmp_path / "small")
     assert pieces == whole

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import laspy
 import numpy as np
@@ -144,16 +143,3 @@ def test_samples_have_no_fields(tmp_path):
     np.save(tmp_path / "s.npy", np.zeros((4, 4), np.float32))
     with pytest.raises(InputError, match=r"s\.npy: it has no numbers of returns"):
         read(tmp_path / "s.npy", fields=("returns",))
-
-
-def test_the_guide_lists_the_measurements_of_the_package():
-    page = (Path(__file__).parents[2] / "docs" / "guides" / "measurements.md").read_text()
-    table = page.partition("<!-- measurements -->\n")[2].partition("<!-- end -->")[0]
-    fields = {"intensity": "intensity", "returns": "numbers of returns"}
-    rows = []
-    for name in sorted(MEASUREMENTS.built_in()):
-        measurement = measurement_named(name)
-        said = " ".join((measurement.__doc__ or "").split()).removeprefix("phi = ").rstrip(".")
-        needs = ", ".join(fields[field] for field in measurement.fields)
-        rows.append(f"| `{name}` | {said} | {needs} |".replace("|  |", "| |"))
-    assert table.splitlines()[2:] == rows

@@ -33,7 +33,8 @@ class Window:
 
     def inside(self, xyz: np.ndarray) -> np.ndarray:
         """(N,) bool, which of the points (N, 3) m are in the square."""
-        return (np.abs(xyz[:, :2] - (self.x, self.y)) <= self.edge / 2).all(axis=1)
+        away = np.abs(xyz[:, :2] - (self.x, self.y)).max(axis=1)
+        return np.asarray(away <= self.edge / 2)
 
 
 def middle_of(survey: str | Path, n_points: int) -> tuple[float, float]:

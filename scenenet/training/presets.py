@@ -50,11 +50,20 @@ OBSERVERS: Mapping[str, Mapping[str, Any]] = {
         },
         "search": {"result": "middle", "starts": 256},
     },
+    "vegetation": {
+        "geneos": ("blob", "plane"),
+        "metric": {
+            "false_weight": ELSEWHERE * OF_INTERSECTION,
+            "whole_towers": False,
+            "section_radius": 0.0,
+            "section_above": 0.0,
+        },
+    },
 }
 """Settings of the observers of targets other than towers (docs/method/observers.md), by the name of
 the target; others take the kernels of the thesis."""
 
-VOXEL_SIZES: Mapping[str, float] = {"wire": 0.5}
+VOXEL_SIZES: Mapping[str, float] = {"wire": 0.5, "vegetation": 1.0}
 """m, voxel size of the training of these observers, where none is given."""
 
 

@@ -7,8 +7,11 @@ import subprocess
 import sys
 
 import pytest
+from fixtures.scenes import make_pole_finder
 
 from scenenet.core.provided_code import KERNELS, _provided
+from scenenet.models.model_file import write_model
+from scenenet.models.scenenet import SceneNet
 
 
 @pytest.fixture(autouse=True)
@@ -204,3 +207,21 @@ def test_a_model_with_a_direction_is_certified_by_what_holds_for_it(call, tmp_pa
     shown = call("geneo", "certify", "--model", path)
     assert shown.code == 0
     assert "line: its 32 turns are permuted by a turn of the scene" in shown.out
+
+
+def test_a_tower_is_explained_with_a_kernel_outside_the_package(call, pole_survey, tmp_path):
+    call("geneo", "new", "ring", "--out", tmp_path)
+    KERNELS.provide([tmp_path / "ring.py"])
+    pole, card = make_pole_finder()
+    model = SceneNet([*pole.geneos, "ring"], pole.kernel_size)
+    numbers = model.shape_parameters() | pole.shape_parameters()
+    given = numbers["lambda.cylinder"] - 0.01
+    model.set_shape_parameters(numbers | {"lambda.cylinder": given, "lambda.ring": 0.01})
+    write_model(tmp_path / "m.json", model, card)
+    page = tmp_path / "why.html"
+    explained = call(
+        "explain", pole_survey, "--model", tmp_path / "m.json", "--kernels", tmp_path / "ring.py",
+        "--min-conductor", "0", "--out", page,
+    )  # fmt: skip
+    assert explained.code == 0, explained.err
+    assert ">ring</td>" in page.read_text()

@@ -1,12 +1,11 @@
 """``docs/guides/observer.md`` from its first line to its last: a reader's files and commands.
 
-It is the test, too, of a kernel file outside the package: trained, predicted, explained and
+It is the test, too, of a kernel file outside the package: trained, predicted, scored and
 certified by the command line.
 """
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import re
@@ -16,11 +15,13 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
 from fixtures.forked import SCENENET, command_line
 
 LIMIT_S = 600
+LAMP = 19
 
 
 @dataclass(frozen=True)
@@ -78,23 +79,27 @@ def test_the_kernel_has_about_thirty_lines(reader):
 def test_the_kernel_answers_most_to_lamps_before_training(reader):
     shown = reader.output("scenenet geneo try")
     table = shown.partition("positive   highest\n")[2].splitlines()
-    assert table[0].startswith("15 Transmission tower")
+    assert table[0].startswith("19 Overhead structure")
     places = shown.partition("highest answers")[2].splitlines()[1:5]
-    assert all(place.endswith("15 Transmission tower") for place in places), shown
+    assert all(place.endswith("19 Overhead structure") for place in places), shown
     assert (reader.folder / "lamp.html").read_text().count("data:image/png") == 5
 
 
 def test_the_model_finds_the_lamps_of_another_street(reader):
-    with (reader.folder / "found" / "other.towers.csv").open() as stream:
-        found = sorted((float(row["x"]), float(row["y"])) for row in csv.DictReader(stream))
-    lamps = [(530_012 + 25 * i, 4_630_010) for i in range(3)]
-    assert np.abs(np.array(found) - lamps).max() < 1
-
-
-def test_each_lamp_is_explained(reader):
-    page = (reader.folder / "why.html").read_text()
-    assert page.count(">lamp</td>") == 3
-    assert page.count(">lamp a</td>") == 1
+    las = laspy.read(reader.folder / "found" / "other.laz")
+    tau = json.loads((reader.folder / "lamps.json").read_text())["tau"]
+    found = np.asarray(las["lamp_probability"]) >= np.float32(tau)
+    lamp = np.asarray(las.classification) == LAMP
+    assert (found & lamp).sum() > 0.9 * found.sum()
+    x, z = np.asarray(las.x) - 530_000, np.asarray(las.z) - 100
+    for middle in 25 * np.arange(3) + 12:  # of the three lamps
+        own = lamp & (np.abs(x - middle) < 3)
+        assert found[own & (z > 3) & (z < 9)].mean() > 0.9
+    points = reader.output("scenenet evaluate").splitlines()[-1]
+    assert points.startswith(f"points: {found.sum()} at or above tau, {lamp.sum()} labelled lamp")
+    # The shares of the two kernels add up to the whole answer.
+    shares = np.abs(las["lamp_lamp"]) + np.abs(las["lamp_surroundings"])
+    np.testing.assert_allclose(shares[found], 1, atol=1e-5)
 
 
 def test_the_model_file_names_the_kernel_with_its_digest(reader):

@@ -18,8 +18,10 @@ from scenenet.interpretability.bounded_measurement import bounded
 from scenenet.measurement import PointFields, measurement_named, measurement_of_file
 from scenenet.measurement.heights import columns_around, heights
 from scenenet.measurement.outside import tried_voxels
+from scenenet.models.scenenet import SceneNet
 from scenenet.pointcloud import PointCloud, iter_chunks, read
 from scenenet.pointcloud.class_schemes import ASPRS
+from scenenet.prediction.work.tile_predictor import TilePredictor
 
 BRIGHT = """\
 from scenenet.measurement import Measurement, register
@@ -143,3 +145,10 @@ def test_samples_have_no_fields(tmp_path):
     np.save(tmp_path / "s.npy", np.zeros((4, 4), np.float32))
     with pytest.raises(InputError, match=r"s\.npy: it has no numbers of returns"):
         read(tmp_path / "s.npy", fields=("returns",))
+
+
+def test_voxels_too_small_for_heights_are_refused():
+    model = SceneNet(["cylinder"], (5, 5, 5))
+    assert TilePredictor(model, "height", 0.5, 1)
+    with pytest.raises(InputError, match=r"voxels of 0\.05 m are too small for measurement"):
+        TilePredictor(model, "height", 0.05, 1)

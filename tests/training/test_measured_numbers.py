@@ -20,7 +20,7 @@ from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import read_model, write_model
 from scenenet.models.settings import MetricSettings, ModelSettings, SearchSettings
 from scenenet.synthetic import SyntheticSettings, make_survey
-from scenenet.training.determination import evidence
+from scenenet.training.determination import _changed, evidence
 from scenenet.training.measured_numbers import Measured, measure
 from scenenet.training.train import fit
 
@@ -207,3 +207,13 @@ def test_a_file_from_before_numbers_were_measured_reads_back(tmp_path):
     (tmp_path / "old.json").write_text(json.dumps(written | {"format_version": 6}))
     with pytest.raises(InputError, match="model format 6"):
         read_model(tmp_path / "old.json")
+
+
+@pytest.mark.parametrize("weight", [1.0, 0.9999999, 0.5])
+def test_changed_weights_still_sum_to_one(weight):
+    """A search may leave all others without weight; rounding leaves them a little."""
+    values = {"a.r": 1.0, "lambda.a": weight, "lambda.b": (1 - weight) / 4, "lambda.c": 1e-9}
+    values["lambda.c"] += 1 - sum(v for n, v in values.items() if n.startswith("lambda."))
+    changed = _changed(values, "lambda.a", 0.25)
+    assert changed["lambda.a"] == 0.25 and changed["a.r"] == 1.0
+    assert sum(v for n, v in changed.items() if n != "a.r") == pytest.approx(1)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenenet.core.errors import InputError
 from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.dataset.voxel_measures import VoxelMeasures
@@ -113,10 +114,24 @@ class TilePredictor:
             measurement: of the model (``ModelCard``).
             voxel_size: m.
             fullest: points in the fullest voxel of the survey (``fullest_voxel``).
+
+        Raises:
+            InputError: the ground below a voxel would be looked for beyond the next tile.
         """
         import torch
 
         self.model = model.at(voxel_size)
+        beyond = 0
+        if "height" in measurement_named(measurement).needs:
+            beyond = columns_around(voxel_size)
+        if max(self.model.reach[1:]) + beyond > EDGE:
+            raise InputError(
+                f"voxels of {voxel_size:g} m are too small for measurement {measurement!r}, which "
+                f"looks for the ground {beyond} voxels beyond what the kernels reach, together at "
+                f"most {EDGE}",
+                remedy="Observe larger voxels, or use another measurement",
+            )
+        self._beyond = beyond
         self._measurement, self._fullest = measurement, fullest
         with torch.no_grad():
             self._responses = self.model.responder()
@@ -163,9 +178,9 @@ class TilePredictor:
         shape = [EDGE + 2 * r for r in reach]
         corner = np.array(scene.place) * EDGE - reach
         zyx, around = np.stack(np.unravel_index(scene.voxel, shape), axis=1) + corner, None
-        if "height" in measurement_named(self._measurement).needs:
-            beyond = columns_around(spool.voxel_size)
-            around = spool.columns_around(scene.place, (reach[1] + beyond, reach[2] + beyond))
+        if self._beyond:
+            wide = reach[1] + self._beyond, reach[2] + self._beyond
+            around = spool.columns_around(scene.place, wide)
         known = (scene.count, scene.total, spool.voxel_size, around, self._fullest)
         return VoxelMeasures(zyx, *known).phi(self._measurement)
 

@@ -24,7 +24,7 @@ from scenenet.tracking.ui import comparison, experiment_runs, metric_over_steps,
 if TYPE_CHECKING:
     from mlflow import MlflowClient
     from mlflow.entities import Run
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, BrowserContext, Page
 
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 WIDTH = 1200
@@ -42,6 +42,31 @@ PREFERENCES = {
 """What somebody who uses MLflow for trainings has chosen in it: "Model training" at the top left,
 and the assistant closed."""
 
+SCROLL_TO_METRIC = """async ([name, patience]) => {
+  const end = performance.now() + patience;
+  const drawn = () => new Promise((done) => setTimeout(() => requestAnimationFrame(done), 0));
+  const grids = () => [...document.querySelectorAll("[role=grid]")].slice(-2);
+  const row = () => [...document.querySelectorAll("[role=grid] a")]
+    .find((link) => link.textContent.trim() === name);
+  for (let top = 0; !row() && top < grids()[1].scrollHeight; top += grids()[1].clientHeight) {
+    grids()[1].scrollTop = top;
+    await drawn();
+    await drawn();
+  }
+  if (!row()) return false;
+  // The names lie in a table of their own, which MLflow always scrolls to where the values were
+  // before: two steps bring both to the metric, one pixel apart.
+  const [names, values] = grids();
+  const place = parseFloat(row().parentElement.style.top);
+  const [before, first] = [names.scrollTop, place + (values.scrollTop === place)];
+  values.scrollTop = first;
+  while (names.scrollTop === before && performance.now() < end) await drawn();
+  values.scrollTop = 2 * place + 1 - first;
+  while (names.scrollTop !== first && performance.now() < end) await drawn();
+  return Math.abs(names.scrollTop - values.scrollTop) <= 1;
+}"""
+"""Whether the metric is there; it is then at the top."""
+
 SHOWN_SCORES = ("f05", "precision", "recall", "iou_tower", "miou")
 """What the table of runs shows, of the crops that were scored."""
 
@@ -52,7 +77,28 @@ def chromium() -> str | None:
     return next((found for name in names if (found := shutil.which(name))), None)
 
 
-_started: list[Browser] = []
+@dataclass(frozen=True)
+class _Running:
+    """A process of Chromium.
+
+    Attributes:
+        browser: to ask it.
+        contexts: of its pages, by colour scheme. Pages of one context share what they load, so
+            that the program of MLflow is compiled once and not with every page.
+    """
+
+    browser: Browser
+    contexts: dict[str, BrowserContext]
+
+    def context(self, scheme: str) -> BrowserContext:
+        if scheme not in self.contexts:
+            made = self.browser.new_context(color_scheme=scheme)
+            made.set_default_timeout(PATIENCE_MS)
+            self.contexts[scheme] = made
+        return self.contexts[scheme]
+
+
+_running: list[_Running] = []
 
 
 @contextlib.contextmanager
@@ -62,13 +108,12 @@ def one_browser() -> Iterator[None]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        _started.append(
-            playwright.chromium.launch(executable_path=chromium(), args=["--disable-gpu"])
-        )
+        browser = playwright.chromium.launch(executable_path=chromium(), args=["--disable-gpu"])
+        _running.append(_Running(browser, {}))
         try:
             yield
         finally:
-            _started.pop().close()
+            _running.pop().browser.close()
 
 
 @contextlib.contextmanager
@@ -83,14 +128,15 @@ def browsing(
         stored: what else the browser remembers of its last visit, as in ``localStorage``.
     """
     remembered = json.dumps(PREFERENCES | stored)
-    with contextlib.nullcontext() if _started else one_browser():
-        context = _started[-1].new_context(
-            color_scheme=scheme, viewport={"width": width, "height": height}
-        )
-        context.set_default_timeout(PATIENCE_MS)
-        context.add_init_script(f"Object.assign(localStorage, {remembered})")
-        yield context.new_page()
-        context.close()
+    with contextlib.nullcontext() if _running else one_browser():
+        page = _running[-1].context(scheme).new_page()
+        page.set_viewport_size({"width": width, "height": height})
+        page.add_init_script(f"Object.assign(localStorage, {remembered})")
+        try:
+            yield page
+        finally:
+            page.evaluate("localStorage.clear()")
+            page.close()
 
 
 @dataclass(frozen=True)
@@ -214,31 +260,14 @@ def open_comparison(page: Page, store: Tracked, runs: Sequence[Run]) -> None:
 
 
 def scroll_to_metric(page: Page, name: str) -> None:
-    """Bring a metric to the top of the table of a comparison, which draws what is scrolled to."""
-    table = page.get_by_role("grid").last
-    table.wait_for()
-    page.wait_for_function(
-        """async ([name]) => {
-          const table = [...document.querySelectorAll("[role=grid]")].pop();
-          for (let top = 0; top < table.scrollHeight; top += 100) {
-            table.scrollTop = top;
-            await new Promise((done) => setTimeout(done, 50));
-            const row = [...document.querySelectorAll("[role=grid] a")]
-              .find((link) => link.textContent.trim() === name);
-            if (!row) continue;
-            // The names lie in a table of their own, which follows a moment later.
-            const names = [...document.querySelectorAll("[role=grid]")].at(-2);
-            const place = parseFloat(row.parentElement.style.top);
-            for (let attempt = 0; attempt < 40; attempt++) {
-              table.scrollTop = place + attempt % 2;
-              await new Promise((done) => setTimeout(done, 50));
-              if (attempt % 2 === 0 && names.scrollTop === table.scrollTop) return true;
-            }
-          }
-          return false;
-        }""",
-        arg=[name],
-    )
+    """Bring a metric to the top of the table of a comparison, which draws what is scrolled to.
+
+    Raises:
+        InputError: the table has no such metric.
+    """
+    page.get_by_role("grid").last.wait_for()
+    if not page.evaluate(SCROLL_TO_METRIC, [name, PATIENCE_MS]):
+        raise InputError(f"the comparison shows no metric {name!r}", remedy="Run the workflow")
 
 
 def _columns(experiment: str, runs: Sequence[Run]) -> dict[str, str]:

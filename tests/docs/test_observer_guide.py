@@ -11,7 +11,6 @@ import os
 import re
 import shlex
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,6 +21,13 @@ from fixtures.forked import SCENENET, command_line
 
 LIMIT_S = 600
 LAMP = 19
+PROGRAMS = {
+    "scenenet": SCENENET,
+    "python": "import runpy, sys; sys.argv.pop(0); runpy.run_path(sys.argv[0], {}, '__main__')",
+    "pytest": "import sys, pytest; "
+    "sys.exit(pytest.main(['-p', 'no:cacheprovider', *sys.argv[1:]]))",
+}
+"""What the page calls, as programs of a process that has their libraries already."""
 
 
 @dataclass(frozen=True)
@@ -36,20 +42,16 @@ class Reader:
     folder: Path
     shown: dict[str, str]
 
-    def call(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Call ``scenenet``."""
+    def call(self, *arguments: str, program: str = "scenenet") -> subprocess.CompletedProcess[str]:
+        """Call ``scenenet``, or another program of the page."""
         environment = {name: v for name, v in os.environ.items() if name != "SCENENET_KERNELS"}
-        return command_line().call(SCENENET, arguments, self.folder, environment, LIMIT_S)
+        source = PROGRAMS[program]
+        return command_line().call(source, arguments, self.folder, environment, LIMIT_S)
 
     def run(self, line: str) -> None:
         """Run a line of a shell example."""
         program, *arguments = shlex.split(line)
-        if program == "scenenet":
-            done = self.call(*arguments)
-        else:
-            module = [] if program == "python" else ["-m", program, "-p", "no:cacheprovider"]
-            call = [sys.executable, *module, *arguments]
-            done = subprocess.run(call, cwd=self.folder, capture_output=True, text=True)
+        done = self.call(*arguments, program=program)
         assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
         self.shown[line] = done.stdout
 

@@ -6,7 +6,6 @@ import csv
 import json
 import re
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
 import laspy
@@ -45,7 +44,7 @@ def first(project_in, project_root, tmp_path_factory, pole_finder, scene):
 
     There are three poles in three tiles, and one in a tile 3 km to the east.
     """
-    project = replace(project_in(tmp_path_factory.mktemp("tiled") / "project"), forked=True)
+    project = project_in(tmp_path_factory.mktemp("tiled") / "project")
     copy_parts(project_root, project.folder, PARTS)
     test = yaml.safe_load((project.folder / "config" / "test.yaml").read_text())
     own = {"results_dir": "results", "surveys": "config/surveys.tsv", "studies": []}

@@ -180,6 +180,7 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of synthetic lines": of_files("lines", "seed of the line", TRUTH),
         "figures of recordings": of_files("recordings", "recording", ""),
         "figures of observers of conductors": printed("observers", "observers.txt", 0),
+        "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }
 

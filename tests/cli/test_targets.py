@@ -54,6 +54,15 @@ def test_only_a_model_of_towers_gives_whole_towers():
         ModelSettings(name="m", kind="scenenet", protocol="operational", target="wire")
 
 
+def test_vegetation_has_an_observer_of_its_own_whatever_its_codes():
+    for text in ("vegetation", "vegetation=5,12"):
+        chosen = preset("scenenet", "operational", target=Target.parse(text))
+        assert chosen.geneos == ("blob", "plane") and not chosen.gives_whole_towers
+    wish = {"geneos": ["line"], "target": Target("vegetation")}
+    other = preset("scenenet", "operational", **wish)
+    assert other.geneos == ("line",)
+
+
 def test_settings_of_a_model_of_towers_are_those_of_earlier_versions():
     tower, wire = (ModelSettings(name="m", kind="cnn", target=name) for name in ("tower", "wire"))
     assert "target" not in tower.model_dump()

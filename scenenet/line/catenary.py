@@ -2,7 +2,7 @@
 
 In the vertical plane through its attachments, with s along it: z(s) = c cosh((s - s0) / c) + k. The
 catenary parameter c (m) is the horizontal tension over the weight per metre. The wire of a span L
-sags by about L^2 / (8 c).
+sags by about L^2 / (8 c). Wind moves it out of that plane, most in the middle of the span.
 """
 
 from __future__ import annotations
@@ -23,17 +23,22 @@ class Catenary:
     Attributes:
         start, end: (x, y, z), m.
         parameter: c, m.
+        blowout: m, how far the wind moves its middle to the left; less elsewhere, as a parabola.
     """
 
     start: tuple[float, float, float]
     end: tuple[float, float, float]
     parameter: float
+    blowout: float = 0.0
 
     @classmethod
-    def of(cls, start: np.ndarray, end: np.ndarray, parameter: float) -> Catenary:
+    def of(
+        cls, start: np.ndarray, end: np.ndarray, parameter: float, blowout: float = 0.0
+    ) -> Catenary:
         """Between two points (3,) m."""
         x, y, z = map(float, start)
-        return cls((x, y, z), (float(end[0]), float(end[1]), float(end[2])), parameter)
+        far = float(end[0]), float(end[1]), float(end[2])
+        return cls((x, y, z), far, parameter, blowout)
 
     @cached_property
     def length(self) -> float:
@@ -69,7 +74,15 @@ class Catenary:
         """Points (n, 3), m, at shares u (n,) of the horizontal distance from start to end."""
         (x, y, _), (far_x, far_y, _) = self.start, self.end
         z = self.height(u * self.length)
-        return np.column_stack((x + u * (far_x - x), y + u * (far_y - y), z))
+        places = np.column_stack((x + u * (far_x - x), y + u * (far_y - y), z))
+        if self.blowout:
+            east, north = self.direction
+            places[:, :2] += self._blown(u)[:, None] * np.array([-north, east])
+        return places
+
+    def _blown(self, u: np.ndarray) -> np.ndarray:
+        """m to the left at shares u of the length."""
+        return 4 * self.blowout * u * (1 - u)
 
     def along(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """s along the wire from its start, and t to its left, each (n,) m, of points (n, 2 or 3)
@@ -82,13 +95,15 @@ class Catenary:
         """How far points (n, 3) m are to the left of the curve, and above it at a right angle to
         it, each (n,) m. The ends do not limit the curve."""
         s, t = self.along(xyz)
+        t = t - self._blown(s / self.length)
         above = (xyz[:, 2] - self.height(s)) / np.sqrt(1 + self.slope(s) ** 2)
         return t, above
 
     def between(self, first: float, last: float) -> Catenary:
         """The same curve between other distances from the start, m."""
         start, end = self.at(np.array([first, last]))
-        return Catenary.of(start, end, self.parameter)
+        blowout = float(self.blowout * ((last - first) / self.length) ** 2)
+        return Catenary.of(start, end, self.parameter, blowout)
 
     @cached_property
     def sag(self) -> float:

@@ -126,7 +126,7 @@ def _turned(span: TracedSpan) -> TracedSpan:
     frame = span.frame
     x, y, _ = frame.to_map(np.array([[frame.length, 0.0, 0.0]]))[0].tolist()
     wires = (
-        replace(wire, catenary=Catenary(w.end, w.start, w.parameter))
+        replace(wire, catenary=Catenary(w.end, w.start, w.parameter, -w.blowout))
         for wire in span.wires for w in (wire.catenary,)
     )  # fmt: skip
     other = replace(frame, x=x, y=y, direction=-frame.direction)
@@ -157,7 +157,8 @@ def _conductors(span: TracedSpan, span_id: int, *, cable: bool) -> list[Conducto
             Conductor(
                 catenary=curve, tube=tube, span_id=span_id, conductor_id=number + 1, kind=kind,
                 subconductors=wire.subconductors, from_tower=_id(span.start),
-                to_tower=_id(span.end), c=curve.parameter, sag=curve.sag, length=curve.length,
+                to_tower=_id(span.end), c=curve.parameter, sag=curve.sag, blowout=curve.blowout,
+                length=curve.length,
                 rmse=wire.rmse, points=len(wire.rows), seen=wire.covered,
                 from_z=curve.start[2], to_z=curve.end[2],
                 from_height=from_height, to_height=to_height,

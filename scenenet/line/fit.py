@@ -14,6 +14,10 @@ SHORTEST_PARAMETER_M = 60.0
 NOISE_M = 0.03
 """m, least spread of points about a wire: what a survey scanner measures to."""
 
+BLOWOUT = 1e-3
+"""Share of its length by which the wind moves the middle of a wire sideways: 0.3 m of 300 m, as
+far as a survey is flown in little wind. It is a prior, not a limit."""
+
 TUKEY = 4.685
 """Robust standard deviations from which a residual has no weight (Tukey's biweight, 95 % as
 efficient as least squares for normal errors)."""
@@ -81,7 +85,8 @@ def fit_catenary(
         if length <= 0:
             return None
         u = (s - low) / length
-        beside = _solve(np.column_stack((1 - u, u)), t, weights)
+        bowed = np.column_stack((1 - u, u, 4 * u * (1 - u)))
+        beside = _solve(bowed, t, weights, (0.0, NOISE_M / (BLOWOUT * length)))
         stretch = np.hypot(1.0, (beside[1] - beside[0]) / length)  # per metre along s
         span = length * stretch
         # z is nearly linear in the heights of the ends and 1 / c: a parabola, and a small rest
@@ -94,7 +99,7 @@ def fit_catenary(
         curvature = float(np.clip(curvature, 1 / TAUT_M, 1 / SHORTEST_PARAMETER_M))
         catenary = Catenary(
             (low, float(beside[0]), float(first)), (high, float(beside[1]), float(last)),
-            1 / curvature,
+            1 / curvature, float(beside[2]),
         )  # fmt: skip
         right, above = catenary.residuals(stz)
         distance = np.hypot(right, above)

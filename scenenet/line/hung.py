@@ -125,5 +125,5 @@ def _hung(wire: Wire, rows: np.ndarray, frame: SpanFrame) -> HungWire:
     """The wire in map coordinates."""
     catenary = wire.fit.catenary
     start, end = frame.to_map(np.array([catenary.start, catenary.end]))
-    on_map = Catenary.of(start, end, catenary.parameter)
+    on_map = Catenary.of(start, end, catenary.parameter, catenary.blowout)
     return HungWire(on_map, wire.fit.rmse, rows, wire.covered, wire.bundle)

@@ -43,7 +43,8 @@ def lone_spans(
         frame = _straightest(points.xyz, left)
         if frame is None:
             return found
-        rows = points.beside(frame, REACH_M, beyond=REACH_M)
+        frame = _cut(frame, towers)
+        rows = points.beside(frame, REACH_M, beyond=PAST_M)
         rows = rows[free[rows] & points.certain[rows]]
         wires = [
             wire
@@ -112,6 +113,19 @@ def _axis(places: np.ndarray) -> SpanFrame | None:
     on_axis = middle + across * np.array([-direction[1], direction[0]])
     start = on_axis + low * direction
     return SpanFrame(float(start[0]), float(start[1]), direction, float(high - low))
+
+
+def _cut(frame: SpanFrame, towers: Sequence[LineTower]) -> SpanFrame:
+    """The longest part of a stretch between towers: wires bend there."""
+    cuts = [0.0, frame.length]
+    for tower in towers:
+        s, t = frame.to_frame(np.array([[tower.x, tower.y, 0.0]]))[0, :2].tolist()
+        if PAST_M < s < frame.length - PAST_M and abs(t) <= REACH_M / 2:
+            cuts.append(s)
+    cuts.sort()
+    first = int(np.argmax(np.diff(cuts)))
+    x, y, _ = frame.to_map(np.array([[cuts[first], 0.0, 0.0]]))[0].tolist()
+    return SpanFrame(x, y, frame.direction, cuts[first + 1] - cuts[first])
 
 
 def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[TracedSpan]:

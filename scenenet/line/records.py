@@ -37,6 +37,9 @@ class Conductor:
         "m", "greatest vertical distance from the straight line between its ends", heading="sag",
         vertical=True,
     )  # fmt: skip
+    blowout: float = column(
+        "m", "how far wind moves its middle to the left of the straight line in plan"
+    )
     length: float = column("m", "horizontal distance between its ends", heading="length")
     rmse: float = column(
         "m", "root mean square distance of its points from the catenary", heading="RMSE"
@@ -69,7 +72,7 @@ class Conductor:
         """What ``to_json`` gave."""
         x, y, z, far_x, far_y, far_z, parameter = data["catenary"]
         own = {c.name: data[c.name] for c in CONDUCTOR_COLUMNS}
-        curve = Catenary((x, y, z), (far_x, far_y, far_z), parameter)
+        curve = Catenary((x, y, z), (far_x, far_y, far_z), parameter, data["blowout"])
         return cls(catenary=curve, tube=data["tube"], **own)
 
 

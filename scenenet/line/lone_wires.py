@@ -13,8 +13,8 @@ from scenenet.line.frame import SpanFrame
 from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.wire_points import WirePoints
 
-MIN_ALONE_M = 25.0
-"""m, length of a wire without two towers, at least."""
+MIN_ALONE_M, MIN_HELD_M = 25.0, 15.0
+"""m, length of a wire without a tower, and of one with one, at least."""
 
 WORST_ALONE_M = 0.08
 """m, greatest root mean square distance of its points from its catenary."""
@@ -49,7 +49,7 @@ def lone_spans(
         wires = [
             wire
             for wire in traced(points, rows, frame)
-            if wire.catenary.length >= MIN_ALONE_M
+            if wire.catenary.length >= MIN_HELD_M
             and wire.rmse <= WORST_ALONE_M
             and wire.covered >= SEEN_ALONE
         ]
@@ -63,7 +63,7 @@ def lone_spans(
 
 def _straightest(xyz: np.ndarray, left: np.ndarray) -> SpanFrame | None:
     """The longest straight stretch in plan among the points that are left, or None if none is
-    ``MIN_ALONE_M`` long. ``left`` loses points that belong to no stretch."""
+    ``MIN_HELD_M`` long. ``left`` loses points that belong to no stretch."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
@@ -75,7 +75,7 @@ def _straightest(xyz: np.ndarray, left: np.ndarray) -> SpanFrame | None:
         links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(cells),) * 2)
         label = connected_components(links, directed=False)[1]
         sizes = np.bincount(label)
-        small = sizes < MIN_ALONE_M / 4
+        small = sizes < MIN_HELD_M / 2
         left[rows[small[label[of.ravel()]]]] = False
         if small.all():
             return None
@@ -108,7 +108,7 @@ def _axis(places: np.ndarray) -> SpanFrame | None:
     starts, stops = np.append(0, breaks + 1), np.append(breaks, len(s) - 1)
     run = int(np.argmax(s[stops] - s[starts]))
     low, high = s[starts[run]], s[stops[run]]
-    if high - low < MIN_ALONE_M:
+    if high - low < MIN_HELD_M:
         return None
     on_axis = middle + across * np.array([-direction[1], direction[0]])
     start = on_axis + low * direction
@@ -141,6 +141,8 @@ def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[T
         for number, tower in enumerate((first, last)):
             if tower is not None:
                 reach[number] = float(catenary.along(tower.place[None])[0][0])
+        if first is None and last is None and catenary.length < MIN_ALONE_M:
+            continue
         wire = replace(wire, catenary=catenary.between(*reach))
         key = (0 if first is None else first.id, 0 if last is None else last.id)
         groups.setdefault(key, []).append((wire, first, last))

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-WINDOW_M = 12.0
-"""m, length of a piece. A wire of a parameter of 300 m bends by 6 cm over it."""
+WINDOW_M, SHORTEST_WINDOW_M, WINDOWS = 12.0, 4.0, 4
+"""m, length of a piece: a wire of a parameter of 300 m bends by 6 cm over it. In a short stretch of
+wires pieces are shorter, so that it has so many, but not shorter than the second number."""
 
 APART_M = 0.5
 """m, least distance between two wires that are told apart. Subconductors of a bundle are 0.3 to
@@ -55,24 +56,30 @@ class Pieces:
         return len(self.middle)
 
 
-def find_pieces(stz: np.ndarray) -> Pieces:
-    """The pieces among points (n, 3) m in the frame of a span. Windows overlap by half."""
+def window_of(length: float) -> float:
+    """m, length of the pieces of wires that are ``length`` m long."""
+    return float(np.clip(length / WINDOWS, SHORTEST_WINDOW_M, WINDOW_M))
+
+
+def find_pieces(stz: np.ndarray, length: float = WINDOW_M) -> Pieces:
+    """The pieces of ``length`` m among points (n, 3) m in the frame of a span. Windows overlap by
+    half."""
     middles, slopes, weights, windows, members = [], [], [], [], []
     order = np.argsort(stz[:, 0], kind="stable")
     s = stz[order, 0]
     if len(s) == 0:
         return Pieces(np.empty((0, 3)), np.empty((0, 2)), np.empty(0), np.empty(0, int), [])
-    step = WINDOW_M / 2
+    step = length / 2
     first, last = int(np.floor(s[0] / step)) - 1, int(np.floor(s[-1] / step))
     for window in range(first, last + 1):
-        low, high = np.searchsorted(s, [window * step, window * step + WINDOW_M])
+        low, high = np.searchsorted(s, [window * step, window * step + length])
         rows = order[low:high]
         if len(rows) < MIN_POINTS:
             continue
         for group in _groups(stz[rows], (window + 1) * step):
             own = rows[group]
             reach = np.ptp(stz[own, 0])
-            if len(own) < MIN_POINTS or reach < MIN_SHARE * WINDOW_M:
+            if len(own) < MIN_POINTS or reach < MIN_SHARE * length:
                 continue
             middle, slope, spread = _straight(stz[own])
             if abs(slope[1]) > STEEPEST or spread > THICKEST_M:

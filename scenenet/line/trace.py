@@ -9,7 +9,7 @@ import numpy as np
 from scenenet.line.bundles import subconductors
 from scenenet.line.catenary import Catenary
 from scenenet.line.fit import SHORTEST_PARAMETER_M, Fit, Prior, fit_catenary
-from scenenet.line.pieces import APART_M, WINDOW_M, Pieces, find_pieces
+from scenenet.line.pieces import APART_M, WINDOW_M, Pieces, find_pieces, window_of
 
 ON_WIRE_M = 0.35
 """m, distance up to which a piece agrees with a wire: half a bundle, and the error of a piece."""
@@ -19,6 +19,9 @@ IN_BUNDLE_M = 0.6
 
 SLOPE = 0.06
 """Difference of slopes up to which a piece agrees with a wire: the error of a piece of 5 m."""
+
+STEEPEST_ERROR = 0.15
+"""The same for the shortest pieces, at most."""
 
 SIDEWAYS = 0.25
 """Greatest change of t per metre along the span of its wires: 4 m more reach over 16 m."""
@@ -31,6 +34,10 @@ STEP_M, GAP_M = 2.0, 60.0
 
 MIN_COVERED = 0.3
 """Share of the windows between the ends of a wire that have a piece of it, at least."""
+
+USUAL = Prior(1 / 1500.0, 1 / 1500.0)
+"""Curvature of the wires of power lines: c is mostly from 500 to 2500 m. It only decides where a
+wire is too short to show its own."""
 
 PRIOR_SPREAD = 0.15
 """Standard deviation of the curvature of wires of a span, as a share of their median."""
@@ -65,27 +72,30 @@ def trace_wires(stz: np.ndarray, limit: int = 80) -> list[Wire]:
     Args:
         limit: wires, at most.
     """
-    pieces = find_pieces(stz)
+    if len(stz) == 0:
+        return []
+    window = window_of(float(np.ptp(stz[:, 0])))
+    pieces = find_pieces(stz, window)
     left = np.ones(len(pieces), bool)
     free = np.ones(len(stz), bool)
     found: list[Wire] = []
-    guesses = _Guesses(pieces, left)
+    guesses = _Guesses(pieces, left, window)
     while len(found) < limit:
         support = guesses.best(left)
         if support is None:
             if not guesses.cut:
                 break
-            guesses = _Guesses(pieces, left)
+            guesses = _Guesses(pieces, left, window)
             continue
         left[support] = False
         rows = np.unique(np.concatenate([pieces.members[number] for number in support]))
         rows = rows[free[rows]]
         fit = fit_catenary(stz[rows], np.ones(len(rows)), _prior(found))
-        wire = None if fit is None else _supported(stz, fit, free)
+        wire = None if fit is None else _supported(stz, fit, free, window)
         if wire is None:
             continue
         # Pieces beside a wire are of its bundle or its noise.
-        left[_near(pieces, wire.fit.catenary, APART_M)] = False
+        left[_near(pieces, wire.fit.catenary, window)] = False
         free[wire.rows] = False
         found.append(wire)
     return found
@@ -98,23 +108,24 @@ class _Guesses:
         cut: whether there were more of them than are kept.
     """
 
-    def __init__(self, pieces: Pieces, left: np.ndarray) -> None:
-        """Guess from the pieces that are ``left`` (P,)."""
+    def __init__(self, pieces: Pieces, left: np.ndarray, window: float) -> None:
+        """Guess from the pieces of ``window`` m that are ``left`` (P,)."""
+        slope = min(SLOPE * WINDOW_M / window, STEEPEST_ERROR)
         self._pieces = pieces
         self._numbers = numbers = np.flatnonzero(left)
         s, t, z = pieces.middle[numbers].T
         ts, zs = pieces.slopes[numbers].T
         weight = pieces.weight[numbers]
-        i, j = np.nonzero(s[None, :] - s[:, None] >= 2 * WINDOW_M)
+        i, j = np.nonzero(s[None, :] - s[:, None] >= 2 * window)
         ds = s[j] - s[i]
         sideways, curvature = (t[j] - t[i]) / ds, (zs[j] - zs[i]) / ds
         # The chord of a parabola is as steep as the mean of its ends.
         chord = (z[j] - z[i]) / ds - (zs[i] + zs[j]) / 2
-        good = np.abs(chord) <= SLOPE / 2
+        good = np.abs(chord) <= slope / 2
         good &= np.abs(sideways) <= SIDEWAYS
-        good &= (np.abs(sideways - ts[i]) <= SLOPE) & (np.abs(sideways - ts[j]) <= SLOPE)
+        good &= (np.abs(sideways - ts[i]) <= slope) & (np.abs(sideways - ts[j]) <= slope)
         # The slopes of two pieces give a curvature with an error, which the chord does not have.
-        error = SLOPE / ds
+        error = slope / ds
         good &= (curvature >= -error) & (curvature <= 1 / SHORTEST_PARAMETER_M + error)
         kept = np.flatnonzero(good)
         self.cut = len(kept) > MOST_GUESSES
@@ -128,8 +139,8 @@ class _Guesses:
         up = z[i, None] + (rise[:, None] + curvature[:, None] / 2 * from_i) * from_i
         steep = rise[:, None] + curvature[:, None] * from_i
         self._on = np.hypot(t - across, z - up) <= ON_WIRE_M
-        self._on &= np.abs(zs - steep) <= SLOPE
-        self._on &= np.abs(ts - sideways[:, None]) <= SLOPE
+        self._on &= np.abs(zs - steep) <= slope
+        self._on &= np.abs(ts - sideways[:, None]) <= slope
         self._seen = self._on.astype(np.float32)
 
     def best(self, left: np.ndarray) -> np.ndarray | None:
@@ -146,15 +157,15 @@ class _Guesses:
         return rows
 
 
-def _near(pieces: Pieces, catenary: Catenary, distance: float) -> np.ndarray:
-    """(P,) bool, which pieces lie within a distance in m of a wire."""
+def _near(pieces: Pieces, catenary: Catenary, beyond: float) -> np.ndarray:
+    """(P,) bool, which pieces lie beside a wire, or less than ``beyond`` m past its ends."""
     right, above = catenary.residuals(pieces.middle)
     along, _ = catenary.along(pieces.middle)
-    inside = (along >= -WINDOW_M) & (along <= catenary.length + WINDOW_M)
-    return inside & (np.hypot(right, above) <= distance)
+    inside = (along >= -beyond) & (along <= catenary.length + beyond)
+    return inside & (np.hypot(right, above) <= APART_M)
 
 
-def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray) -> Wire | None:
+def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float) -> Wire | None:
     """The wire with all its points and its true ends, or None if too little of it is seen."""
     catenary = fit.catenary
     right, above = catenary.residuals(stz)
@@ -169,10 +180,10 @@ def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray) -> Wire | None:
     longest = int(np.argmax(stops - starts))
     part = seen[starts[longest] : stops[longest] + 1]
     low, high = part[0], part[-1] + STEP_M
-    half = WINDOW_M / 2
+    half = window / 2
     n_seen = len(np.unique(np.floor((part - low) / half)))
     covered = n_seen / max(np.ceil((high - low) / half), 1)
-    if high - low < 2 * WINDOW_M or covered < MIN_COVERED:
+    if high - low < 2 * window or covered < MIN_COVERED:
         return None
     inside = on & (along >= low) & (along <= high)
     rows = np.flatnonzero(inside)
@@ -208,9 +219,9 @@ def _bundled(
     return Wire(again, rows, covered, len(places))
 
 
-def _prior(found: list[Wire]) -> Prior | None:
-    """Curvature that the wires found so far suggest."""
+def _prior(found: list[Wire]) -> Prior:
+    """Curvature that the wires found so far suggest, or that most wires have."""
     if not found:
-        return None
+        return USUAL
     curvature = float(np.median([1 / wire.fit.catenary.parameter for wire in found]))
     return Prior(curvature, PRIOR_SPREAD * curvature)

@@ -25,8 +25,9 @@ efficient as least squares for normal errors)."""
 RAYLEIGH_MEDIAN = 1.177
 """Median distance from a wire over the standard deviation to one side, for normal errors."""
 
-ITERATIONS, CHANGE = 15, 1e-3
-"""Iterations at most, and change of a weight at which they end."""
+ITERATIONS, PLAIN, WIDE, CHANGE = 20, 2, 5, 1e-3
+"""Iterations at most, those at the start without weights, in which the curvature is found, those
+after which outliers are told by the full width, and change of a weight at which they end."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,8 @@ def fit_catenary(
     """
     s, t, z = stz.T
     weights = start.astype(float)
-    curvature = 0.0 if prior is None else prior.curvature
-    for _ in range(ITERATIONS):
+    curvature, rise = 0.0 if prior is None else prior.curvature, 0.0
+    for number in range(ITERATIONS):
         used = weights > 0
         if used.sum() < 4:
             return None
@@ -92,10 +93,11 @@ def fit_catenary(
         # z is nearly linear in the heights of the ends and 1 / c: a parabola, and a small rest
         # that the last curvature gives.
         bow = span**2 / 2 * u * (1 - u)
-        rest = _above_parabola(u, span, curvature)
+        rest = _above_parabola(u, span, rise, curvature)
         basis = np.column_stack((1 - u, u, -bow))
         known = None if prior is None else (prior.curvature, NOISE_M / prior.spread)
         first, last, curvature = _solve(basis, z - rest, weights, known)
+        rise = float(last - first)
         curvature = float(np.clip(curvature, 1 / TAUT_M, 1 / SHORTEST_PARAMETER_M))
         catenary = Catenary(
             (low, float(beside[0]), float(first)), (high, float(beside[1]), float(last)),
@@ -104,12 +106,15 @@ def fit_catenary(
         right, above = catenary.residuals(stz)
         distance = np.hypot(right, above)
         spread = max(NOISE_M, float(np.median(distance[used])) / RAYLEIGH_MEDIAN)
-        scale = min(TUKEY * spread, width)
+        # From wide to narrow: the first fits are those of all points, outliers too.
+        scale = min(TUKEY * spread, width * 2.0 ** max(WIDE - number, 0))
+        if number < PLAIN:
+            continue
         before, weights = (
             weights,
             np.where(distance < scale, (1 - (distance / scale) ** 2) ** 2, 0.0),
         )
-        if np.abs(weights - before).max() < CHANGE:
+        if number > PLAIN + WIDE and np.abs(weights - before).max() < CHANGE:
             break
     used = weights > 0
     if used.sum() < 4:
@@ -119,11 +124,12 @@ def fit_catenary(
     return Fit(ends, weights, float(np.sqrt(np.mean(distance[used] ** 2))))
 
 
-def _above_parabola(u: np.ndarray, span: float, curvature: float) -> np.ndarray:
-    """(n,) m, how far a level catenary is above its parabola, at shares u (n,) of the span."""
+def _above_parabola(u: np.ndarray, span: float, rise: float, curvature: float) -> np.ndarray:
+    """(n,) m, how far a catenary is above its parabola, at shares u (n,) of the span. It is further
+    where the wire is steep."""
     c = 1 / max(curvature, 1 / TAUT_M)
-    level = Catenary((0.0, 0.0, 0.0), (span, 0.0, 0.0), c)
-    return level.height(u * span) + curvature * span**2 / 2 * u * (1 - u)
+    wire = Catenary((0.0, 0.0, 0.0), (span, 0.0, rise), c)
+    return wire.height(u * span) - rise * u + curvature * span**2 / 2 * u * (1 - u)
 
 
 def _solve(

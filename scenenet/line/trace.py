@@ -29,8 +29,12 @@ SIDEWAYS = 0.25
 MIN_WINDOWS = 3
 """Windows in which a wire has a piece, at least."""
 
-STEP_M, GAP_M = 2.0, 60.0
-"""m, steps in which it is looked at where a wire is seen, and longest gap in a wire."""
+GAP_M = 60.0
+"""m, longest gap in a wire."""
+
+RING_M, CROWDED = 0.95, 0.5
+"""m, radius of the ring around a wire, and points in it for each point of the wire from which the
+wire is not in free air. Evenly spread points have 1.5."""
 
 MIN_COVERED = 0.3
 """Share of the windows between the ends of a wire that have a piece of it, at least."""
@@ -170,19 +174,30 @@ def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float) -> Wi
     catenary = fit.catenary
     right, above = catenary.residuals(stz)
     along, _ = catenary.along(stz)
-    on = free & (np.hypot(right, above) <= IN_BUNDLE_M)
+    distance = np.hypot(right, above)
+    on = free & (distance <= IN_BUNDLE_M)
+    beside = free & (distance > IN_BUNDLE_M) & (distance <= RING_M)
     if not on.any():
         return None
-    # The ends are where the wire is seen without a long gap between.
-    seen = np.unique(np.floor(along[on] / STEP_M)) * STEP_M
-    gaps = np.flatnonzero(np.diff(seen) > GAP_M)
-    starts, stops = np.append(0, gaps + 1), np.append(gaps, len(seen) - 1)
-    longest = int(np.argmax(stops - starts))
-    part = seen[starts[longest] : stops[longest] + 1]
-    low, high = part[0], part[-1] + STEP_M
     half = window / 2
-    n_seen = len(np.unique(np.floor((part - low) / half)))
-    covered = n_seen / max(np.ceil((high - low) / half), 1)
+    first = np.floor(along[on].min() / half)
+    n = int(np.floor(along[on].max() / half) - first) + 1
+    counts = [
+        np.bincount(
+            np.clip(np.floor(along[rows] / half) - first, 0, n - 1).astype(int), minlength=n
+        )
+        for rows in (on, beside)
+    ]
+    # A wire hangs in free air; leaves are as dense around it.
+    clear = np.flatnonzero((counts[0] > 0) & (counts[1] <= CROWDED * counts[0]))
+    if len(clear) == 0:
+        return None
+    gaps = np.flatnonzero(np.diff(clear) * half > GAP_M)
+    starts, stops = np.append(0, gaps + 1), np.append(gaps, len(clear) - 1)
+    longest = int(np.argmax(stops - starts))
+    part = clear[starts[longest] : stops[longest] + 1]
+    low, high = (first + part[0]) * half, (first + part[-1] + 1) * half
+    covered = len(part) / (part[-1] - part[0] + 1)
     if high - low < 2 * window or covered < MIN_COVERED:
         return None
     inside = on & (along >= low) & (along <= high)

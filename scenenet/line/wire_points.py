@@ -40,7 +40,7 @@ class WirePoints:
         order = np.argsort(of.ravel(), kind="stable")
         rows = np.split(order, np.flatnonzero(np.diff(of.ravel()[order])) + 1)
         centres = (cells + 0.5) * CELL_M
-        return centres, rows, cKDTree(centres if len(centres) else np.zeros((1, 2)) + np.inf)
+        return centres, rows, cKDTree(centres)
 
     def beside(self, frame: SpanFrame, reach: float, beyond: float = 0.0) -> np.ndarray:
         """Rows of the points within ``reach`` m of the axis of a frame, ascending.

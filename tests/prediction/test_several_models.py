@@ -69,7 +69,8 @@ def test_models_at_once_give_what_each_gives_alone(each):
     others = ["wire_probability", *(f"wire_{geneo}" for geneo in geneos)]
     assert list(towers.point_format.extra_dimension_names) == own
     assert list(wires.point_format.extra_dimension_names) == others
-    assert list(both.point_format.extra_dimension_names) == own + others
+    of_the_line = ["span_id", "conductor_id"]
+    assert list(both.point_format.extra_dimension_names) == own + others + of_the_line
     for name, alone in [*((n, towers) for n in own), *((n, wires) for n in others)]:
         np.testing.assert_array_equal(both[name], alone[name])
     assert both["tower_id"].max() > 0 and both["wire_probability"].max() > 0.5

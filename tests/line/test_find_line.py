@@ -1,0 +1,125 @@
+"""The line of a survey: conductors from tower to tower, in order, and what contradicts them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from fixtures.line_scene import KnownLine
+
+from scenenet.line.find_line import find_line
+from scenenet.line.hung import LineTower
+from scenenet.line.records import SurveyLine
+
+
+def errors(line: SurveyLine, known: KnownLine) -> np.ndarray:
+    """(n, 2) m, of each true conductor between towers: median distance of the nearest conductor
+    found between the same towers, and the error of its sag."""
+    found = []
+    for true in known.inner:
+        places = true.catenary.at_shares(np.linspace(0, 1, 40))
+        ends = {true.from_tower, true.to_tower}
+        same = [c for c in line.conductors if {c.from_tower, c.to_tower} == ends]
+        apart = [(float(np.median(np.hypot(*c.catenary.residuals(places)))), c) for c in same]
+        distance, best = min(apart, key=lambda pair: pair[0], default=(np.inf, None))
+        sag = np.inf if best is None else abs(best.sag - true.catenary.sag)
+        found.append((distance, sag))
+    return np.array(found)
+
+
+def held(line: SurveyLine):
+    """Its spans between two towers."""
+    return [span for span in line.spans if span.from_tower and span.to_tower]
+
+
+@pytest.fixture(scope="module", params=["pylons", "poles"])
+def known(request) -> KnownLine:
+    return request.getfixturevalue(request.param)
+
+
+@pytest.fixture(scope="module")
+def line(known) -> SurveyLine:
+    return find_line(known.points, known.towers, known.to_its_ends)
+
+
+def test_every_conductor_is_found_once_with_its_sag(line, known):
+    distance, sag = errors(line, known).T
+    assert distance.max() < 0.05
+    assert np.median(sag) < 0.03 and sag.max() < 0.1
+    assert sum(span.conductors + span.earth_wires for span in held(line)) == len(known.inner)
+
+
+def test_spans_are_in_the_order_of_the_line(line, known):
+    expected = list(pairwise(tower.id for tower in known.towers))
+    found = [(span.from_tower, span.to_tower) for span in held(line)]
+    assert found in (expected, [(b, a) for a, b in reversed(expected)])
+    assert {span.line for span in line.spans} == {1}
+    assert [span.order for span in line.spans] == list(range(1, len(line.spans) + 1))
+
+
+def test_angles_are_those_of_the_towers(line, known):
+    places = {tower.id: tower.place for tower in known.towers}
+    ways = [places[span.to_tower] - places[span.from_tower] for span in held(line)]
+    for span, (before, after) in zip(held(line), pairwise(ways), strict=False):
+        bearings = np.degrees([np.arctan2(*before), np.arctan2(*after)])
+        turn = (bearings[1] - bearings[0] + 180) % 360 - 180
+        assert span.angle == pytest.approx(turn, abs=0.1)
+
+
+def test_earth_wires_are_told_apart(line, known):
+    n_earth = sum(conductor.is_earth_wire for conductor in known.inner)
+    assert sum(span.earth_wires for span in held(line)) == n_earth
+
+
+def test_wires_are_attached_where_their_towers_hold_them(line, known):
+    true = np.array([end for c in known.inner for end in (c.catenary.start, c.catenary.end)])
+    outer = {known.towers[0].id, known.towers[-1].id}
+    for conductor in line.conductors:
+        if not (conductor.from_tower and conductor.to_tower):
+            continue
+        curve = conductor.catenary
+        for tower, end in ((conductor.from_tower, curve.start), (conductor.to_tower, curve.end)):
+            # Beyond the outer towers only 30 m say where the line leads, and so how it turns.
+            assert np.linalg.norm(true - end, axis=1).min() < (0.5 if tower in outer else 0.1)
+
+
+def test_a_line_that_leaves_the_survey_says_so(line):
+    assert line.spans[0].ends == line.spans[-1].ends == "leaves the survey"
+    assert line.notes == ()
+
+
+def test_a_missed_tower_is_expected_where_it_stands(pylons):
+    missed = pylons.towers[2]
+    towers = [tower for tower in pylons.towers if tower is not missed]
+    line = find_line(pylons.points, towers, pylons.everywhere)
+    expected = [note for note in line.notes if note.what == "tower expected"]
+    apart = [np.hypot(note.x - missed.x, note.y - missed.y) for note in expected]
+    assert min(apart) < 10.0
+
+
+def test_a_tower_beside_the_line_has_no_conductor(pylons):
+    first = pylons.towers[0]
+    false = LineTower(99, first.x + 60.0, first.y + 60.0, first.base, 20.0)
+    line = find_line(pylons.points, [*pylons.towers, false], pylons.to_its_ends)
+    assert [(n.what, n.tower) for n in line.notes] == [("tower without a conductor", 99)]
+
+
+def test_points_that_are_not_certain_help_beside_those_that_are(poles):
+    certain = np.ones(len(poles.xyz), bool)
+    certain[np.hypot(*poles.inner[0].catenary.residuals(poles.xyz)) < 0.2] = False
+    line = find_line(replace(poles.points, certain=certain), poles.towers, poles.to_its_ends)
+    assert errors(line, poles)[0, 0] < 0.05
+
+
+def test_nothing_is_found_where_there_is_nothing(poles):
+    empty = replace(poles.points, xyz=np.empty((0, 3)), certain=np.empty(0, bool))
+    line = find_line(empty, poles.towers, poles.to_its_ends)
+    assert line.spans == line.conductors == ()
+    assert {note.what for note in line.notes} == {"tower without a conductor"}
+    assert find_line(empty, [], poles.to_its_ends).notes == ()
+
+
+def test_the_record_of_a_line_is_read_back(line):
+    assert SurveyLine.from_json(line.to_json()) == line

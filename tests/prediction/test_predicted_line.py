@@ -1,0 +1,103 @@
+"""The line of a survey: conductors and spans in the results of a prediction."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import laspy
+import numpy as np
+import pyogrio
+import pytest
+from fixtures import scenes
+from fixtures.scenes import model_card
+
+from scenenet.detection.settings import DetectionSettings
+from scenenet.models.factory import new_model
+from scenenet.models.model_file import write_model
+from scenenet.pointcloud.targets import Target
+from scenenet.prediction.line_lists import AS_FLOWN
+from scenenet.prediction.result_files import PredictionFiles
+from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.writers import predict_to_files
+from scenenet.training.presets import preset
+
+WIRE_Z = 13.8
+LONE_POLES = DetectionSettings(min_conductor=0)
+
+
+@pytest.fixture(scope="module")
+def wire_finder(tmp_path_factory) -> Path:
+    """A model of wires with numbers set by hand."""
+    path = tmp_path_factory.mktemp("wires") / "wires.json"
+    found = new_model(preset("scenenet", "operational", target=Target.parse("wire")), 0)
+    numbers = found.numbers()
+    numbers[-2:] = 0.7, 0.15  # of the mixture of the first observer: about a half and two quarters
+    found.set_numbers(numbers)
+    card = model_card(name="wires", target="wire", voxel_size=0.5, tau=0.2)
+    write_model(path, found, card)
+    return path
+
+
+@pytest.fixture(scope="module")
+def predicted(line, model, wire_finder, tmp_path_factory) -> PredictionFiles:
+    files = PredictionFiles.of(line, tmp_path_factory.mktemp("predicted"), line=True)
+    predict_to_files(line, [model, wire_finder], files, PredictSettings(), LONE_POLES)
+    return files
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_the_conductor_is_traced_from_pole_to_pole_and_beyond(predicted):
+    spans, conductors = (rows(path) for path in predicted.line_tables)
+    towers = {row["id"]: float(row["x"]) - scenes.PLACE[0] for row in rows(predicted.table)}
+    held = [row for row in spans if row["ends"] == "between towers"]
+    ends = [sorted(towers[row[end]] for end in ("from_tower", "to_tower")) for row in held]
+    # The wire ends in the air, 27 m before the third pole, and leads to it.
+    np.testing.assert_allclose(ends, [(30.5, 75.5), (75.5, 130.5)], atol=1.0)
+    assert [float(row["length"]) for row in held] == pytest.approx([45.0, 55.0], abs=1.5)
+    assert {row["line"] for row in spans} == {"1"}
+    assert [row["order"] for row in spans] == ["1", "2", "3"]
+    assert len(conductors) == 3
+    for row in conductors:
+        assert row["kind"] == "conductor"
+        assert float(row["from_z"]) == pytest.approx(scenes.PLACE[2] + WIRE_Z, abs=0.1)
+        assert float(row["sag"]) == pytest.approx(0.0, abs=0.1)
+
+
+def test_each_point_of_the_wire_has_its_span_and_no_other_point_has_one(predicted, line):
+    [path] = predicted.points.values()
+    points = laspy.read(path)
+    on_wire = np.asarray(laspy.read(line).classification) == 16
+    spans = {int(row["span_id"]) for row in rows(predicted.line_tables[0])}
+    assert set(np.unique(points["span_id"]).tolist()) - {0} == spans
+    np.testing.assert_array_equal(points["span_id"] > 0, points["conductor_id"] > 0)
+    found = np.asarray(points["conductor_id"]) > 0
+    assert found[on_wire].mean() > 0.95
+    assert on_wire[found].mean() > 0.95
+
+
+def test_the_layers_have_the_rows_of_the_tables(predicted):
+    for layer, table in zip(("spans", "conductors"), predicted.line_tables, strict=True):
+        info = pyogrio.read_info(predicted.geopackage, layer=layer)
+        assert info["features"] == len(rows(table))
+        assert list(info["fields"]) == list(rows(table)[0])
+    wires = pyogrio.raw.read(predicted.geopackage, layer="conductors")
+    assert wires[0]["geometry_type"] == "LineString Z"
+
+
+def test_the_summary_counts_the_line_and_says_what_its_positions_are(predicted):
+    line = json.loads(predicted.summary.read_text())["line"]
+    assert (line["lines"], line["spans"], line["conductors"]) == (1, 3, 3)
+    assert line["positions"] == AS_FLOWN
+
+
+def test_towers_alone_leave_no_outdated_line(predicted, line, model):
+    files = PredictionFiles.of(line, predicted.summary.parent)
+    predict_to_files(line, model, files, PredictSettings(), LONE_POLES)
+    assert not any(path.exists() for path in predicted.line_tables)
+    assert "spans" not in pyogrio.list_layers(files.geopackage)[:, 0]

@@ -103,6 +103,14 @@ def section_of(occupancy: Occupancy, offsets: np.ndarray, *, hollow: bool) -> Se
     return Section(at, starts, rows)
 
 
+def part_of(section: Section, voxels: np.ndarray) -> Section:
+    """The cross-sections of some of the occupied voxels (R,), with the same rows."""
+    starts, lengths = section.starts[voxels], np.diff(section.starts)[voxels]
+    ends = np.append(0, np.cumsum(lengths))
+    at = np.repeat(starts - ends[:-1], lengths) + np.arange(ends[-1])
+    return Section(section.at, ends, section.rows[at])
+
+
 @numba.njit(**COMPILED)
 def _mark(index, grids, shape, offsets, needed, starts):  # pragma: no cover - compiled
     """Mark the voxels of all cross-sections in ``needed``, and count those of each in

@@ -168,6 +168,17 @@ class GeneoModel(VoxelModel):
 
         return parts
 
+    def responder_at(self) -> Callable[[Occupancy, np.ndarray], Tensor]:
+        """As ``responder``, for the voxels at some positions (A,), ascending, as
+        ``Occupancy.flat`` numbers them; without cross-sections."""
+        weights = self.mixing_weights().detach()
+        orbits = [_stored(kernels) for kernels in self.orbits()]
+
+        def parts(occupancy: Occupancy, at: np.ndarray) -> Tensor:
+            return mixed(weights[:, None] * _answers(orbits, occupancy, at), self.mixes)
+
+        return parts
+
     def weighted_kernels(self) -> Tensor:
         """lambda_k g_k, (K, kz, ky, kx): the kernels whose sum is the observer's."""
         return self.mixing_weights()[:, None, None, None] * self.kernels()
@@ -234,13 +245,16 @@ def _stored(kernels: Tensor) -> Orbit | Tensor:
     return Orbit.of(kernels) if len(kernels) > 1 else kernels.detach()
 
 
-def _answers(orbits: Sequence[Orbit | Tensor], occupancy: Occupancy) -> Tensor:
-    """The response of each GENEO at the occupied voxels, (K, M), before mixing."""
+def _answers(
+    orbits: Sequence[Orbit | Tensor], occupancy: Occupancy, at: np.ndarray | None = None
+) -> Tensor:
+    """The response of each GENEO at the occupied voxels, (K, M), or at positions ``at`` (A,),
+    before mixing."""
     return torch.stack(
         [
-            torch.from_numpy(strongest_at_voxels(occupancy, orbit))
+            torch.from_numpy(strongest_at_voxels(occupancy, orbit, at))
             if isinstance(orbit, Orbit)
-            else convolve_at_voxels(occupancy, orbit)[0]
+            else convolve_at_voxels(occupancy, orbit, at)[0]
             for orbit in orbits
         ]
     )

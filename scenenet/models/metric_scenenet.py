@@ -15,6 +15,7 @@ from scenenet.convolution.coarsening import block_edge
 from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.convolution.cross_section import (
     Section,
+    part_of,
     section_of,
     section_offsets,
     strongest,
@@ -293,6 +294,22 @@ class MetricSceneNet(GeneoModel):
             measured = occupancy.measured(phi.numpy())
             found[:, phi > 0] = _strongest_parts(answer(measured), self.section(measured))
             return found
+
+        return parts
+
+    def second_responder(self) -> Callable[[Occupancy, np.ndarray], Tensor]:
+        """The answers of this observer where the first one has been asked: a function from grids,
+        whose values are the answers of the first observer, all above 0, and the rows (R,) of some
+        of their voxels, ascending, to the parts (K, R) of H there. They equal those of
+        ``responder``."""
+        answer = self.responder_at()
+
+        def parts(measured: Occupancy, rows: np.ndarray) -> Tensor:
+            section = part_of(self.section(measured), rows)
+            needed = np.unique(section.rows)
+            found = answer(measured, measured.flat()[needed])
+            own = section._replace(rows=np.searchsorted(needed, section.rows).astype(np.int32))
+            return _strongest_parts(found, own)
 
         return parts
 

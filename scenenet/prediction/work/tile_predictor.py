@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Sequence
+from collections import OrderedDict
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,10 +18,12 @@ from scenenet.measurement.registry import PRESENCE, measurement_named
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.block_file import BlockWriter
 from scenenet.prediction.work.tile_predictions import PREDICTED_KINDS, TilePrediction, geneo_names
-from scenenet.prediction.work.tiling import EDGE, Layer, Tile, TileSpool, code_of
+from scenenet.prediction.work.tiling import EDGE, Layer, Tile, TileSpool, by_column, code_of
 from scenenet.prediction.work.work_file import WorkFile
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from scenenet.models.base import VoxelModel
     from scenenet.models.model_file import ModelCard
 
@@ -28,6 +31,11 @@ if TYPE_CHECKING:
 AT_ONCE, MOST_AT_ONCE = 4096, 64
 """Tiles are predicted together until they have so many voxels, or there are so many of them: a
 survey with points far apart has a thousand tiles of a voxel each."""
+
+
+KEPT_ANSWERS = 16_000_000
+"""Answers of a first observer in memory, 4 bytes each: those of three rows of tiles of a survey
+some kilometres wide."""
 
 
 def predict_file(
@@ -56,7 +64,7 @@ def predict_file(
     Raises:
         OutputError: ``out`` cannot be written.
     """
-    codes = sorted(code for code in own.blocks.codes(spool.kind) if code not in done)
+    codes = sorted((c for c in own.blocks.codes(spool.kind) if c not in done), key=by_column)
     tiles = (spool.tile(code) for code in codes)
     predict = TilePredictor(model, card.measurement, spool.voxel_size, fullest)
     with atomic(out) as partial, partial.open("wb") as stream:
@@ -120,6 +128,8 @@ class TilePredictor:
         """
         import torch
 
+        from scenenet.models.metric_scenenet import MetricSceneNet
+
         self.model = model.at(voxel_size)
         beyond = 0
         if "height" in measurement_named(measurement).needs:
@@ -133,8 +143,14 @@ class TilePredictor:
             )
         self._beyond = beyond
         self._measurement, self._fullest = measurement, fullest
+        self._first: FirstAnswers | None = None
         with torch.no_grad():
-            self._responses = self.model.responder()
+            if isinstance(self.model, MetricSceneNet) and self.model.first is not None:
+                before = TilePredictor(self.model.first, measurement, voxel_size, fullest)
+                self._first = FirstAnswers(before)
+                self._second = self.model.second_responder()
+            else:
+                self._responses = self.model.responder()
 
     def __call__(
         self, spool: TileSpool, tiles: Sequence[Tile]
@@ -146,32 +162,69 @@ class TilePredictor:
         """
         import torch
 
-        from scenenet.convolution.occupancy import Occupancy
         from scenenet.models.geneo_model import GeneoModel
 
-        reach = self.model.reach
-        shape = EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
-        scenes = [spool.around(tile.place, reach) for tile in tiles]
-        phi = None
-        if self._measurement != PRESENCE:
-            phi = [self._phi(spool, scene, reach) for scene in scenes]
-        occupancy = Occupancy.of_grids([scene.voxel for scene in scenes], phi, shape)
-        inner = np.concatenate([
-            first + _inner(scene.voxel, shape, reach)
-            for first, scene in zip(occupancy.offsets[:-1], scenes, strict=True)
-        ])  # fmt: skip
         with torch.no_grad():
             # The shares are those of the voxel that the maximum of the cross-section is from.
-            parts = self._responses(occupancy)[:, torch.from_numpy(inner)]
+            parts = (
+                self._parts(spool, tiles) if self._first is None else self._composed(spool, tiles)
+            )
             observed = parts.sum(dim=0)
             if isinstance(self.model, GeneoModel):
                 weight = parts.abs().sum(dim=0).clamp(min=torch.finfo(parts.dtype).tiny)
                 shares = (parts / weight).T.contiguous().numpy()
             else:
-                shares = np.empty((len(inner), 0), np.float32)
+                shares = np.empty((len(observed), 0), np.float32)
             probability = torch.relu(torch.tanh(observed)).numpy()
         ends = np.cumsum([len(tile.voxel) for tile in tiles])[:-1]
         return list(zip(np.split(probability, ends), np.split(shares, ends), strict=True))
+
+    def _parts(self, spool: TileSpool, tiles: Sequence[Tile]) -> Tensor:
+        """Parts (K, M) of H at the occupied voxels of the tiles."""
+        import torch
+
+        from scenenet.convolution.occupancy import Occupancy
+
+        reach = self.model.reach
+        shape = _with_halo(reach)
+        scenes = [spool.around(tile.place, reach) for tile in tiles]
+        phi = None
+        if self._measurement != PRESENCE:
+            phi = [self._phi(spool, scene, reach) for scene in scenes]
+        occupancy = Occupancy.of_grids([scene.voxel for scene in scenes], phi, shape)
+        inner = [
+            first + _inner(scene.voxel, shape, reach)
+            for first, scene in zip(occupancy.offsets[:-1], scenes, strict=True)
+        ]
+        return self._responses(occupancy)[:, torch.from_numpy(np.concatenate(inner))]
+
+    def _composed(self, spool: TileSpool, tiles: Sequence[Tile]) -> Tensor:
+        """The same for a model with a first observer, which is asked once for each tile, and not
+        once more for each halo."""
+        import torch
+
+        from scenenet.convolution.occupancy import Occupancy
+
+        assert self._first is not None
+        answers = self._first.of(spool)
+        z, y, x = (
+            own - before for own, before in zip(self.model.reach, self._first.reach, strict=True)
+        )
+        reach = z, y, x
+        shape = _with_halo(reach)
+        scenes = [spool.valued_around(tile.place, reach, answers) for tile in tiles]
+        voxels, values = zip(*scenes, strict=True)
+        measured = Occupancy.of_grids(voxels, values, shape)
+        rows, places = [], []
+        n = 0
+        for start, voxel, tile in zip(measured.offsets[:-1], voxels, tiles, strict=True):
+            rows.append(start + _inner(voxel, shape, reach))
+            places.append(n + np.flatnonzero(answers(code_of(tile.place)) > 0))
+            n += len(tile.voxel)
+        found = self._second(measured, np.concatenate(rows))
+        parts = torch.zeros((len(found), n), dtype=found.dtype)
+        parts[:, torch.from_numpy(np.concatenate(places))] = found
+        return parts
 
     def _phi(self, spool: TileSpool, scene: Tile, reach: tuple[int, int, int]) -> np.ndarray:
         """The measurement at the voxels (M,) of a tile with its halo."""
@@ -183,6 +236,42 @@ class TilePredictor:
             around = spool.columns_around(scene.place, wide)
         known = (scene.count, scene.total, spool.voxel_size, around, self._fullest)
         return VoxelMeasures(zyx, *known).phi(self._measurement)
+
+
+class FirstAnswers:
+    """What the first observer of a model answers, tile by tile. The last answers stay in memory,
+    because the halos of the next tiles need them.
+
+    Attributes:
+        reach: of that observer, voxels (z, y, x).
+    """
+
+    def __init__(self, predict: TilePredictor) -> None:
+        """Ask nothing yet."""
+        self._predict = predict
+        self.reach = predict.model.reach
+        self._kept: OrderedDict[int, np.ndarray] = OrderedDict()
+        self._voxels = 0
+
+    def of(self, spool: TileSpool) -> Callable[[int], np.ndarray]:
+        """Gives the answers (M,) float32 in [0, 1] at the voxels of the tile with a code."""
+
+        def answers(code: int) -> np.ndarray:
+            if code not in self._kept:
+                [(probability, _)] = self._predict(spool, [spool.tile(code)])
+                self._kept[code] = probability
+                self._voxels += len(probability)
+                while self._voxels > KEPT_ANSWERS and len(self._kept) > 1:
+                    self._voxels -= len(self._kept.popitem(last=False)[1])
+            self._kept.move_to_end(code)
+            return self._kept[code]
+
+        return answers
+
+
+def _with_halo(reach: tuple[int, int, int]) -> tuple[int, int, int]:
+    """(D, H, W) of a tile with ``reach`` voxels around it."""
+    return EDGE + 2 * reach[0], EDGE + 2 * reach[1], EDGE + 2 * reach[2]
 
 
 def _together(tiles: Iterable[Tile]) -> Iterator[list[Tile]]:

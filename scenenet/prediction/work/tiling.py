@@ -7,7 +7,7 @@ coordinates. The prediction of a tile is therefore the same wherever a survey is
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import product
 from types import MappingProxyType
@@ -277,6 +277,33 @@ class TileSpool:
         total = np.concatenate([*totals, np.empty(0, np.int64)])[order] if self._measured else None
         return Tile(place, index[order].astype(np.int32), count[order], total)
 
+    def valued_around(
+        self,
+        place: tuple[int, int, int],
+        reach: tuple[int, int, int],
+        values: Callable[[int], np.ndarray],
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """As ``around``, with a number for each voxel: positions (M,) int32, ascending, and values
+        (M,) float32 of the voxels whose value is above 0.
+
+        Args:
+            values: gives those of the voxels of the tile with a code.
+        """
+        low = np.asarray(place) * EDGE - reach
+        shape = np.array([EDGE + 2 * r for r in reach])
+        indices, found = [np.empty(0, np.int64)], [np.empty(0, np.float32)]
+        for code in _encode(np.asarray(place) + NEIGHBOURS).tolist():
+            if code not in self._files:
+                continue
+            value = values(code)
+            zyx = self.tile(code).zyx() - low
+            inside = ((zyx >= 0) & (zyx < shape)).all(axis=1) & (value > 0)
+            indices.append(np.ravel_multi_index(tuple(zyx[inside].T), tuple(shape)))
+            found.append(value[inside])
+        index = np.concatenate(indices)
+        order = np.argsort(index, kind="stable")
+        return index[order].astype(np.int32), np.concatenate(found)[order]
+
     def columns_around(self, place: tuple[int, int, int], reach: tuple[int, int]) -> np.ndarray:
         """(K, 3) zyx on the lattice, all occupied voxels below, in and above a tile, and up to
         ``reach`` (y, x) voxels beside it.
@@ -328,6 +355,13 @@ def _ascending(values: np.ndarray) -> np.ndarray:
 def code_of(place: tuple[int, int, int]) -> int:
     """The code of the tile at ``place`` (z, y, x)."""
     return int(_encode(np.asarray(place)[None])[0])
+
+
+def by_column(code: int) -> tuple[int, int, int]:
+    """(y, x, z) of the tile with ``code``: the order in which the neighbours of a tile come soon
+    after it."""
+    z, y, x = _decode(code)
+    return y, x, z
 
 
 def column_of(code: int) -> tuple[int, int]:

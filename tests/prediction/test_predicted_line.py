@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 
 import laspy
+import line_pictures
 import numpy as np
 import pyogrio
 import pytest
@@ -94,6 +95,21 @@ def test_the_summary_counts_the_line_and_says_what_its_positions_are(predicted):
     line = json.loads(predicted.summary.read_text())["line"]
     assert (line["lines"], line["spans"], line["conductors"]) == (1, 3, 3)
     assert line["positions"] == AS_FLOWN
+
+
+def test_the_picture_draws_each_conductor_over_the_points(predicted):
+    found = line_pictures.FoundLine.of(predicted)
+    plan, profile = line_pictures.draw(found).axes
+    conductors = rows(predicted.line_tables[1])
+    span = profile.get_title(loc="left").rpartition(" ")[2]
+    own = [row["span_id"] for row in conductors].count(span)
+    # Beside the wires: in plan the points, the towers and what the legend shows of a conductor.
+    assert len(plan.lines) == len(conductors) + 3
+    assert own > 0
+    wires = [drawn for drawn in profile.lines if drawn.get_linewidth() == line_pictures.WIRE_WIDTH]
+    assert len(wires) == own
+    heights = np.concatenate([drawn.get_ydata() for drawn in wires])
+    np.testing.assert_allclose(heights, scenes.PLACE[2] + WIRE_Z, atol=0.15)
 
 
 def test_towers_alone_leave_no_outdated_line(predicted, line, model):

@@ -20,6 +20,27 @@ def tower_list() -> str:
     return _table("column", ((c.name, c.unit, c.description) for c in TOWER_COLUMNS))
 
 
+def spans() -> str:
+    """Every column of the list of spans."""
+    from scenenet.line.records import SPAN_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in SPAN_COLUMNS))
+
+
+def conductors() -> str:
+    """Every column of the list of conductors."""
+    from scenenet.line.records import CONDUCTOR_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in CONDUCTOR_COLUMNS))
+
+
+def line_notes() -> str:
+    """Every column of the list of places to look at."""
+    from scenenet.line.records import NOTE_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in NOTE_COLUMNS))
+
+
 def class_schemes() -> str:
     """Every class scheme."""
     from scenenet.pointcloud.class_schemes import markdown
@@ -61,6 +82,9 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "measurements": measurements,
     "scores": scores,
     "tower list": tower_list,
+    "spans": spans,
+    "conductors": conductors,
+    "line notes": line_notes,
 }
 """What stands in the first comment -> the table."""
 

@@ -103,8 +103,8 @@ class LineSpan:
     earth_wires: int = column("", "earth wires", heading="earth wires")
     worst_rmse: float = column("m", "largest RMSE of its conductors", heading="worst RMSE")
     ends: str = column(
-        "", "what is known of its ends: between towers, leaves the survey, or tower expected",
-        heading="ends",
+        "", "what is known of its ends: between towers, leaves the survey, tower expected, or "
+        "cable", heading="ends",
     )  # fmt: skip
 
     def to_json(self) -> dict[str, Any]:
@@ -124,7 +124,7 @@ class LineNote:
 
     x: float = column("m", "easting", heading="x")
     y: float = column("m", "northing", heading="y")
-    what: str = column("", "what the line says of the place", heading="what")
+    what: str = column("", "tower expected, or tower without a conductor", heading="what")
     tower: int = column("", "id of the tower there, 0 for none", heading="tower")
     span_id: int = column("", "number of the span that says it, 0 for none", heading="span")
 

@@ -12,6 +12,8 @@ from scenenet.experiments.components import run as components
 from scenenet.experiments.components.summary import summarise_components
 from scenenet.experiments.cross_validation.run import COLUMNS
 from scenenet.experiments.cross_validation.summary import summarise_folds
+from scenenet.line.records import CONDUCTOR_COLUMNS, NOTE_COLUMNS, SPAN_COLUMNS
+from scenenet.prediction.point_dimensions import LINE_DIMENSIONS
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +46,25 @@ def test_runs_and_table_of_the_parts_of_the_method_are_described(page):
     ):
         assert page[heading].lacks(columns) == set()
         assert page[heading].invents(columns) == set()
+
+
+@pytest.mark.parametrize(
+    ("heading", "columns"),
+    [
+        ("SURVEY.spans.csv", SPAN_COLUMNS),
+        ("SURVEY.conductors.csv", CONDUCTOR_COLUMNS),
+        ("SURVEY.gpkg, layer line_notes", NOTE_COLUMNS),
+    ],
+)
+def test_the_tables_of_a_line_are_described(page, heading, columns):
+    kind = page[f"predict/SURVEY/{heading}"]
+    names = [c.name for c in columns]
+    assert kind.lacks(names) == set()
+    assert kind.invents(names) == set()
+
+
+def test_the_dimensions_of_a_line_are_described(page):
+    assert page["predict/SURVEY/SURVEY.laz"].lacks(LINE_DIMENSIONS) == set()
 
 
 def test_a_missing_column_would_be_noticed(page):

@@ -15,9 +15,12 @@ from fixtures.output_reference import Described, described, description_of
 
 pytestmark = pytest.mark.workflow
 
-ONLY_ELSEWHERE = {"sample", "samples", "search", "metric", "evidence", "target", "first"}
-"""Names of results that this run does not have: those of TS40K folders, of models in metres and of
-other targets."""
+ONLY_ELSEWHERE = {
+    "sample", "samples", "search", "metric", "evidence", "target", "first", "span_id",
+    "conductor_id",
+}  # fmt: skip
+"""Names of results that this run does not have: those of TS40K folders, of models in metres, of
+other targets and of lines."""
 FREE_KEYS = ("mlflow/NAME.json", "config.yaml")
 """Files whose keys are names that the user chose."""
 

@@ -4,7 +4,8 @@ what it is, and the files, the report and the reference pages follow from that."
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, TypeVar, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 Row = TypeVar("Row")
 
@@ -27,7 +28,8 @@ class FieldColumn:
         description: what it is, for the reference page.
         heading: name in tables for people, without the unit; None where tables leave it out.
         vertical: whether its length is along z, whose unit may differ from that of x and y.
-        type: of its values: ``int``, ``float``, ``str``, ``bool``, ``tuple`` or ``Mapping``.
+        type: of its values: ``int``, ``float``, ``str``, ``bool``, ``tuple`` or ``Mapping``. A value may
+            be None where the field allows it.
     """
 
     name: str
@@ -52,17 +54,28 @@ def columns_of(kind: type) -> tuple[FieldColumn, ...]:
             description=f.metadata["description"],
             heading=f.metadata["heading"],
             vertical=f.metadata["vertical"],
-            type=get_origin(types[f.name]) or types[f.name],
+            type=_type(types[f.name]),
         )
         for f in fields(kind)
         if "unit" in f.metadata
     )
 
 
+def _type(hint: Any) -> Any:
+    """The type of the values that are not None."""
+    if isinstance(hint, UnionType):
+        hint = next(each for each in get_args(hint) if each is not NoneType)
+    return get_origin(hint) or hint
+
+
 def in_units(row: Row, sizes: tuple[float, float, float]) -> Row:
-    """A row whose lengths in m become lengths in units of which x, y and z have ``sizes`` in m."""
+    """A row whose lengths in m become lengths in units of which x, y and z have ``sizes`` in m.
+
+    None stays None.
+    """
     planar, _, vertical = sizes
     lengths = [each for each in columns_of(type(row)) if each.unit == "m"]
+    known = [(c, c.value(row)) for c in lengths if c.value(row) is not None]
     return replace(
-        row, **{c.name: c.value(row) / (vertical if c.vertical else planar) for c in lengths}
+        row, **{c.name: value / (vertical if c.vertical else planar) for c, value in known}
     )  # type: ignore[type-var]

@@ -10,6 +10,11 @@ from typing import Any, Self
 from scenenet.core.columns import column, columns_of
 from scenenet.line.catenary import Catenary
 
+AS_FLOWN = (
+    "as flown: positions at the temperature, load and wind of the flight, not at other temperatures"
+)
+"""What every output about the wires of a line says of their positions."""
+
 
 @dataclass(frozen=True)
 class Conductor:

@@ -22,9 +22,11 @@ import numpy as np
 
 from scenenet.core.errors import InputError
 
-Role = Literal["tower", "conductor", "vegetation", "ground", "noise", "other"]
-"""What a class is to the method. ``ground`` includes surfaces on it; ``noise`` are the points that
-the producer marked as noise."""
+Role = Literal[
+    "tower", "conductor", "fitting", "vegetation", "ground", "building", "noise", "other"
+]
+"""What a class is to the method. ``fitting`` are insulators, and cables that are no conductors;
+``ground`` includes surfaces on it; ``noise`` are the points that the producer marked as noise."""
 
 Look = Literal["ground", "low", "tall", "stray", "other", "conductor", "tower"]
 """What a point looks like in a crop: ``low`` and ``tall`` are vegetation and objects by height."""
@@ -54,7 +56,9 @@ ROLE_COLOURS: Mapping[Role, str] = MappingProxyType(
 )
 """Colour of each role in all other pictures, the most important role first."""
 
-_LOOK_OF_ROLE: Mapping[Role, Look] = MappingProxyType({"vegetation": "tall", "noise": "stray"})
+_LOOK_OF_ROLE: Mapping[Role, Look] = MappingProxyType(
+    {"vegetation": "tall", "noise": "stray", "building": "other", "fitting": "other"}
+)
 _ROLE_OF_LOOK: Mapping[Look, Role] = MappingProxyType(
     {"low": "vegetation", "tall": "vegetation", "ground": "ground"}
 )
@@ -167,7 +171,7 @@ EDP = ClassScheme(
         ClassCode(3, "Low vegetation", "vegetation", "low"),
         ClassCode(4, "Medium vegetation", "vegetation", "low"),
         ClassCode(5, "Natural obstacle", "vegetation", "tall"),
-        ClassCode(6, "Human structures"),
+        ClassCode(6, "Human structures", "building"),
         ClassCode(7, "Low point", "noise"),
         ClassCode(8, "Model keypoints"),
         ClassCode(9, "Water", "other", "ground"),
@@ -179,7 +183,7 @@ EDP = ClassScheme(
         ClassCode(15, "Power line support tower", "tower"),
         ClassCode(16, "Main power line", "conductor", main=True),
         ClassCode(17, "Other power line", "conductor"),
-        ClassCode(18, "Fiber optic cable"),
+        ClassCode(18, "Fiber optic cable", "fitting"),
         ClassCode(19, "Not rated object to be considered", "other", "ground"),
         ClassCode(20, "Not rated object to be ignored"),
         ClassCode(21, "Incidents"),
@@ -196,7 +200,7 @@ ASPRS = ClassScheme(
         ClassCode(3, "Low vegetation", "vegetation"),
         ClassCode(4, "Medium vegetation", "vegetation"),
         ClassCode(5, "High vegetation", "vegetation"),
-        ClassCode(6, "Building"),
+        ClassCode(6, "Building", "building"),
         ClassCode(7, "Low point (noise)", "noise"),
         ClassCode(8, "Model keypoint"),
         ClassCode(9, "Water"),
@@ -206,7 +210,7 @@ ASPRS = ClassScheme(
         ClassCode(13, "Wire - guard (shield)", "conductor"),
         ClassCode(14, "Wire - conductor (phase)", "conductor", main=True),
         ClassCode(15, "Transmission tower", "tower"),
-        ClassCode(16, "Wire-structure connector (insulator)"),
+        ClassCode(16, "Wire-structure connector (insulator)", "fitting"),
         ClassCode(17, "Bridge deck"),
         ClassCode(18, "High noise", "noise"),
         ClassCode(19, "Overhead structure"),

@@ -25,12 +25,6 @@ DRAWN_M = 5.0
 """m, steps along a conductor at which a layer has its vertices. The chord of a wire with c = 300 m
 is 1 cm above it there."""
 
-AS_FLOWN = (
-    "as flown: positions at the temperature, load and wind of the flight, not at other temperatures"
-)
-"""What every output about the wires of a line says of their positions."""
-
-
 def write_spans_csv(path: str | Path, line: SurveyLine, sizes: tuple[float, float, float]) -> None:
     """Write a row per span.
 

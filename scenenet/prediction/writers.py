@@ -14,12 +14,11 @@ from scenenet.core.files import atomic, write_json
 from scenenet.core.provenance import fingerprint, package_version
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import row_types
-from scenenet.line.records import SurveyLine
+from scenenet.line.records import AS_FLOWN, SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.copc import write_copc
 from scenenet.prediction.file_status import write_status
 from scenenet.prediction.line_lists import (
-    AS_FLOWN,
     write_conductors_csv,
     write_line_layers,
     write_spans_csv,

@@ -1,0 +1,122 @@
+"""What the points around a line are: ground, vegetation or building."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.clearance.ground_model import GroundModel
+from scenenet.pointcloud.class_schemes import ClassScheme
+
+NO_OBSTACLE, ON_GROUND, PLANT, HOUSE = -1, 0, 1, 2
+"""Kinds of points; those from 0 are numbers in ``scenenet.clearance.settings.KINDS``."""
+
+BY_HEIGHT = 127
+"""The kind of a class code of whose points the height above ground says what they are."""
+
+BAND_M, BAND_SLOPE = 0.3, 0.35
+"""m above the ground up to which a point is on it: on level ground, and more for each unit of
+slope."""
+
+BELOW_M = 2.0
+"""m below the ground from which a point is a stray return."""
+
+COLUMN_M, GAP_M, GAP = 5.0, 20.0, 0.6
+"""m, edge of columns; points in one above a gap of this many m, and of this share of their height,
+are in the air: birds, clouds, and wires that were not found."""
+
+MIN_GROUND = 50
+"""Points with a class of ground from which the ground model is made of them."""
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Points around a section of a line.
+
+    Attributes:
+        xyz: (n, 3) m.
+        kind: (n,) int8, number of the kind, or ``NO_OBSTACLE``.
+        height: (n,) m above the ground.
+        ground: below them.
+    """
+
+    xyz: np.ndarray
+    kind: np.ndarray
+    height: np.ndarray
+    ground: GroundModel
+
+
+def kinds_from(scheme: ClassScheme | None) -> str:
+    """Where the kinds of points are from, as every output says it."""
+    if scheme is None:
+        return "from height above ground; vegetation includes buildings and other objects"
+    return f"from classes {scheme.name}; without a class, from height above ground"
+
+
+def kind_table(scheme: ClassScheme) -> np.ndarray:
+    """(256,) int8, the kind of each class code; ``BY_HEIGHT`` where that decides."""
+    table = np.full(256, BY_HEIGHT, np.int8)
+    table[scheme.is_ground(np.arange(256))] = ON_GROUND
+    for role, kind in (
+        ("vegetation", PLANT), ("building", HOUSE),
+        ("tower", NO_OBSTACLE), ("conductor", NO_OBSTACLE), ("fitting", NO_OBSTACLE),
+        ("noise", NO_OBSTACLE),
+    ):  # fmt: skip
+        table[list(scheme.with_role(role))] = kind  # type: ignore[arg-type]
+    return table
+
+
+def surroundings(
+    xyz: np.ndarray, codes: np.ndarray | None, scheme: ClassScheme | None
+) -> Surroundings:
+    """The kinds of points (n, 3) m, of which none belongs to a line.
+
+    Args:
+        codes: (n,) uint8 class codes; None where only the heights decide.
+        scheme: of the codes.
+    """
+    known = np.full(len(xyz), BY_HEIGHT, np.int8)
+    if scheme is not None and codes is not None:
+        known = kind_table(scheme)[codes]
+        kept = known != NO_OBSTACLE
+        xyz, known = xyz[kept], known[kept]
+    if not len(xyz):
+        flat = GroundModel(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)))
+        return Surroundings(xyz, known, np.empty(0), flat)
+    box = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
+    on_ground = known == ON_GROUND
+    if on_ground.sum() >= MIN_GROUND:
+        ground = GroundModel.from_ground(xyz[on_ground], box)
+    else:
+        ground = GroundModel.from_points(xyz, box)
+    height = xyz[:, 2] - ground.height(xyz[:, :2])
+    band = BAND_M + BAND_SLOPE * ground.slope(xyz[:, :2])
+    by_height = np.where(height <= band, ON_GROUND, PLANT)
+    by_height[(height < -BELOW_M) | _in_the_air(xyz[:, :2], height)] = NO_OBSTACLE
+    kind = np.where(known == BY_HEIGHT, by_height, known).astype(np.int8)
+    return Surroundings(xyz, kind, height, ground)
+
+
+def _in_the_air(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """(n,) bool: which points at places (n, 2) m and heights (n,) m above ground have nothing below
+    them."""
+    found = np.zeros(len(height), bool)
+    if not (height > GAP_M).any():
+        return found
+    east, north = np.floor(xy / COLUMN_M).astype(int).T
+    column = (east - east.min()) * (np.ptp(north) + 1) + north - north.min()
+    high = np.zeros(int(column.max()) + 1, bool)
+    high[column[height > GAP_M]] = True
+    rows = np.flatnonzero(high[column])
+    order = np.lexsort((height[rows], column[rows]))
+    order = rows[order]
+    column, height = column[order], height[order]
+    below = np.concatenate(([0.0], height[:-1]))
+    starts = np.concatenate(([True], column[1:] != column[:-1]))
+    below[starts] = 0.0
+    gaps = np.cumsum(height - below > np.maximum(GAP_M, GAP * height))
+    before = np.concatenate(([0], gaps[:-1]))
+    first = np.maximum.accumulate(np.where(starts, np.arange(len(gaps)), 0))
+    found[order] = gaps > before[first]
+    return found

@@ -1,0 +1,125 @@
+"""A section of a span: what is near its conductors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.clearance.kinds import NO_OBSTACLE, surroundings
+from scenenet.clearance.near_points import Near, near_points
+from scenenet.clearance.settings import ClearanceLimits, ClearanceSettings
+from scenenet.clearance.trees import Trees, find_trees
+from scenenet.line.frame import SpanFrame
+from scenenet.line.records import Conductor
+from scenenet.pointcloud.class_schemes import ClassScheme
+
+SECTION_M = 120.0
+"""m, longest section, which bounds the points in memory."""
+
+AROUND_M = 20.0
+"""m beyond a section whose points show the ground and the crowns in it."""
+
+BEYOND_M = 20.0
+"""m beyond the ends of a span whose points count: outside a bend they are abreast of no span."""
+
+OWN_M = 0.15
+"""m beyond the tube of a conductor within which points are still its own: the noise of single
+returns, spacers and vibration dampers."""
+
+
+@dataclass(frozen=True)
+class Area:
+    """A part of a span in plan.
+
+    Attributes:
+        frame: of the span.
+        first, last: m along it; the last is no part of it.
+        half_width: m to either side.
+    """
+
+    frame: SpanFrame
+    first: float
+    last: float
+    half_width: float
+
+    def box(self) -> np.ndarray:
+        """(2, 2) m, lowest and highest x and y."""
+        s, w = (self.first, self.last), self.half_width
+        corners = np.array([(along, side, 0.0) for along in s for side in (-w, w)])
+        xy = self.frame.to_map(corners)[:, :2]
+        return np.array([xy.min(axis=0), xy.max(axis=0)])
+
+    def has(self, xyz: np.ndarray) -> np.ndarray:
+        """(n,) bool: which points (n, 3) m are in it."""
+        s, t, _ = self.frame.to_frame(xyz).T
+        return (s >= self.first) & (s < self.last) & (np.abs(t) <= self.half_width)
+
+
+PointsIn = Callable[[Area], tuple[np.ndarray, np.ndarray | None]]
+"""Gives the points (n, 3) m of a survey in an area, in a fixed order, with their class codes (n,)
+uint8, or None where they are not known. Points of towers and stray returns may be left out."""
+
+
+@dataclass(frozen=True)
+class MeasuredSection:
+    """What is near the conductors of a section.
+
+    Attributes:
+        near: points.
+        trees: with their foot in the section.
+    """
+
+    near: Near
+    trees: Trees
+
+
+def measure(
+    area: Area,
+    conductors: Sequence[Conductor],
+    others: Sequence[Conductor],
+    points: PointsIn,
+    scheme: ClassScheme | None,
+    limits: ClearanceLimits | None,
+    settings: ClearanceSettings,
+) -> MeasuredSection:
+    """What is near the conductors of a span in a section of it.
+
+    Args:
+        area: the section.
+        conductors: of the span.
+        others: of other spans that may be near; their points are no obstacles.
+        points: of the survey.
+        scheme: of their class codes; None where heights say what they are.
+        limits: for the voltage; None without one.
+    """
+    wide = Area(area.frame, area.first - AROUND_M, area.last + AROUND_M, area.half_width)
+    xyz, codes = points(wide)
+    free = ~_own(xyz, [*conductors, *others])
+    xyz, codes = xyz[free], None if codes is None else codes[free]
+    around = surroundings(xyz, codes, scheme)
+    here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
+    xyz, kind = around.xyz[here], around.kind[here]
+    last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)
+    along = area.frame.to_frame(xyz)[:, 0]
+    step = np.clip((along / settings.step).astype(int), 0, last)
+    trees = find_trees(around, settings.tree_height)
+    inside = area.has(trees.feet)
+    return MeasuredSection(
+        near_points(xyz, kind, step, conductors, limits),
+        Trees(trees.feet[inside], trees.height[inside]),
+    )
+
+
+def _own(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:
+    """(n,) bool: which points (n, 3) m are those of wires."""
+    own = np.zeros(len(xyz), bool)
+    for conductor in conductors:
+        curve, reach = conductor.catenary, conductor.tube + OWN_M
+        low = min(curve.start[2], curve.end[2]) - conductor.sag - reach
+        near = np.flatnonzero((xyz[:, 2] >= low) & ~own)
+        s, t = curve.along(xyz[near])
+        near = near[(np.abs(t) <= reach) & (s >= -reach) & (s <= curve.length + reach)]
+        own[near] = np.hypot(*curve.residuals(xyz[near])) <= reach
+    return own

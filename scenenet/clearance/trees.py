@@ -1,0 +1,118 @@
+"""Single trees, from the heights of vegetation above the ground."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from scenenet.clearance.kinds import PLANT, Surroundings
+
+CELL_M = 0.5
+"""m, edge of the cells of the canopy."""
+
+CROWN_M, CROWN = 1.0, 0.06
+"""m, and share of its height: how far around its top a tree has no other top."""
+
+LAYER_M, FILLED = 2.0, 0.5
+"""m, layers of the upper half of a tree, and the smallest share of them with a point: birds and
+returns from the air have nothing below them."""
+
+DENSE = 0.1
+"""Smallest share of the points in a crown's column that the upper half of the tree has."""
+
+
+@dataclass(frozen=True)
+class Trees:
+    """Trees.
+
+    Attributes:
+        feet: (n, 3) m, below their tops on the ground.
+        height: (n,) m, of their tops above the feet.
+    """
+
+    feet: np.ndarray
+    height: np.ndarray
+
+
+def find_trees(around: Surroundings, min_height: float) -> Trees:
+    """The trees of ``around`` that are at least so high, m.
+
+    Tops are local maxima of the canopy; a lower one within the crown of a higher one is a part of
+    it.
+    """
+    rows = np.flatnonzero((around.kind == PLANT) & (around.height >= min_height))
+    none = Trees(np.empty((0, 3)), np.empty(0))
+    if not len(rows):
+        return none
+    xy, height = around.xyz[rows, :2], around.height[rows]
+    cells = _Cells.of(around.xyz[:, :2])
+    canopy = np.zeros(cells.counts.shape)
+    np.maximum.at(canopy.reshape(-1), cells.flat[rows], height)
+    smooth = ndimage.gaussian_filter(canopy, 1.0, mode="constant")
+    peaks = (ndimage.maximum_filter(smooth, size=3, mode="constant") == smooth) & (smooth > 0)
+    # The highest point within a metre of a peak is the top.
+    tree = cKDTree(xy)
+    near = tree.query_ball_point((np.argwhere(peaks) + cells.corner + 0.5) * CELL_M, CROWN_M)
+    tops = np.unique(np.array([own[int(np.argmax(height[own]))] for own in near if own], int))
+    order = tops[np.lexsort((tops, -height[tops]))]
+    kept: list[int] = []
+    covered = np.zeros(len(xy), bool)
+    for row in order.tolist():
+        if covered[row]:
+            continue
+        crown = CROWN_M + CROWN * height[row]
+        own = np.array(tree.query_ball_point(xy[row], crown))
+        if _is_tree(height[own], float(height[row]), cells.around(xy[row], crown)):
+            covered[own] = True
+            kept.append(row)
+    feet = np.column_stack((xy[kept], around.ground.height(xy[kept])))
+    return Trees(feet, height[kept])
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """Points in square cells.
+
+    Attributes:
+        corner: (2,) number of the first cell, x and y.
+        counts: (columns, rows) points in each cell.
+        flat: (n,) flat number of the cell of each point.
+    """
+
+    corner: np.ndarray
+    counts: np.ndarray
+    flat: np.ndarray
+
+    @classmethod
+    def of(cls, xy: np.ndarray) -> _Cells:
+        """Of points at (n, 2) m, at least one."""
+        at = np.floor(xy / CELL_M).astype(int)
+        corner = at.min(axis=0)
+        columns, rows = at.max(axis=0) - corner + 1
+        flat = (at[:, 0] - corner[0]) * rows + at[:, 1] - corner[1]
+        counts = np.bincount(flat, minlength=columns * rows).reshape(columns, rows)
+        return cls(corner, counts, flat)
+
+    def around(self, xy: np.ndarray, radius: float) -> float:
+        """Number of points, about, within a radius in m of a place (2,) m."""
+        low = np.floor((xy - radius) / CELL_M).astype(int) - self.corner
+        high = np.floor((xy + radius) / CELL_M).astype(int) - self.corner + 1
+        low = np.maximum(low, 0)
+        return float(self.counts[low[0] : high[0], low[1] : high[1]].sum()) * np.pi / 4
+
+
+def _is_tree(heights: np.ndarray, top: float, points: float) -> bool:
+    """Whether points fill the upper half of a tree.
+
+    Args:
+        heights: (n,) m, of the points of vegetation in its crown's column.
+        top: m, height of its top.
+        points: number of all points in this column.
+    """
+    upper = heights[heights >= top / 2]
+    layers = len(np.unique(((top - upper) / LAYER_M).astype(int)))
+    filled = layers >= FILLED * (int(top / 2 / LAYER_M) + 1)
+    return filled and len(upper) >= DENSE * points

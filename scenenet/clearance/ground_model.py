@@ -18,7 +18,7 @@ SLOPE, STEP_M = 0.35, 0.3
 ground."""
 
 TREND, REST_SLOPE = 6.0, 0.12
-"""Cells, width over which the ground is smoothed to take its slope off, and ``SLOPE`` of the rest."""
+"""Cells, width over which the ground is smoothed to take its slope off; ``SLOPE`` of the rest."""
 
 PIT_M = 2.0
 """m below its neighbours from which a cell has a stray return below the ground."""

@@ -169,6 +169,21 @@ class SurveyClearances:
         """The places closer than the limit."""
         return tuple(place for place in self.places if place.what == "danger")
 
+    def counts(self) -> dict[str, Any]:
+        """What was found, in numbers, for a summary."""
+        few = sum(bool(place.note) for place in self.dangers)
+        nearest: dict[str, float] = {}
+        for place in self.places:
+            nearest[place.kind] = min(place.distance, nearest.get(place.kind, place.distance))
+        return {
+            "dangers": len(self.dangers),
+            "few_points": few,
+            "fall_trees": len(self.trees),
+            "nearest_m": nearest,
+            "kinds": self.kinds,
+            "limits": self.limits,
+        }
+
     def to_json(self) -> dict[str, Any]:
         lists = {name: [row.to_json() for row in getattr(self, name)] for name in _LISTS}
         return {**lists, "kinds": self.kinds, "limits": self.limits}

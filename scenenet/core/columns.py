@@ -28,8 +28,8 @@ class FieldColumn:
         description: what it is, for the reference page.
         heading: name in tables for people, without the unit; None where tables leave it out.
         vertical: whether its length is along z, whose unit may differ from that of x and y.
-        type: of its values: ``int``, ``float``, ``str``, ``bool``, ``tuple`` or ``Mapping``. A value may
-            be None where the field allows it.
+        type: of its values: ``int``, ``float``, ``str``, ``bool``, ``tuple`` or ``Mapping``.
+            A value may be None where the field allows it.
     """
 
     name: str

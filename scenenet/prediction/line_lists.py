@@ -25,20 +25,21 @@ DRAWN_M = 5.0
 """m, steps along a conductor at which a layer has its vertices. The chord of a wire with c = 300 m
 is 1 cm above it there."""
 
+
 def write_spans_csv(path: str | Path, line: SurveyLine, sizes: tuple[float, float, float]) -> None:
     """Write a row per span.
 
     Args:
         sizes: sizes in m of the units of x, y and z of the survey, in which the rows are.
     """
-    _write_csv(path, line.spans, SPAN_COLUMNS, sizes)
+    write_table(path, line.spans, SPAN_COLUMNS, sizes)
 
 
 def write_conductors_csv(
     path: str | Path, line: SurveyLine, sizes: tuple[float, float, float]
 ) -> None:
     """Write a row per conductor; arguments as ``write_spans_csv``."""
-    _write_csv(path, line.conductors, CONDUCTOR_COLUMNS, sizes)
+    write_table(path, line.conductors, CONDUCTOR_COLUMNS, sizes)
 
 
 def write_line_layers(
@@ -70,19 +71,43 @@ def write_line_layers(
         ("line_notes", "Point", places, line.notes, NOTE_COLUMNS),
     ]
     for name, kind, geometry, rows, columns in layers:
-        written = [in_units(row, sizes) for row in rows]
-        values = {c.name: [c.value(row) for row in written] for c in columns}
-        types = {c.name: c.type for c in columns}
-        write_layer(path, name, kind, geometry, arrays(values, types), crs)
+        write_rows(path, name, kind, geometry, rows, columns, crs, sizes)
     return [name for name, *_ in layers]
 
 
-def _write_csv(
+def write_rows(
+    path: str | Path,
+    name: str,
+    kind: str,
+    geometry: Sequence[Any],
+    rows: Sequence[Any],
+    columns: Sequence[FieldColumn],
+    crs: pyproj.CRS | None,
+    sizes: tuple[float, float, float],
+) -> None:
+    """Add a layer to a GeoPackage with a feature for each row.
+
+    Args:
+        name: of the layer.
+        kind: geometry type of OGR.
+        geometry: shapely geometries of the rows, in the units of the survey.
+        rows: dataclasses with ``columns``, m.
+        sizes: as ``write_spans_csv``.
+    """
+    written = [in_units(row, sizes) for row in rows]
+    values = {c.name: [c.value(row) for row in written] for c in columns}
+    types = {c.name: c.type for c in columns}
+    write_layer(path, name, kind, geometry, arrays(values, types), crs)
+
+
+def write_table(
     path: str | Path,
     rows: Sequence[Any],
     columns: Sequence[FieldColumn],
     sizes: tuple[float, float, float],
 ) -> None:
+    """Write a row of ``columns`` for each of ``rows`` (dataclasses, m) as CSV; the other arguments
+    are as those of ``write_spans_csv``."""
     with Path(path).open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, [c.name for c in columns], lineterminator="\n")
         table.writeheader()

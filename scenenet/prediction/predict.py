@@ -12,6 +12,8 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TypeVar
 
+from scenenet.clearance.records import SurveyClearances
+from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.files import read_json, write_json
 from scenenet.core.outputs import check_space
 from scenenet.core.progress import quiet, track
@@ -20,12 +22,13 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.targets import WIRE
+from scenenet.prediction.found_clearances import find_clearances_in_survey
 from scenenet.prediction.found_line import find_line_in_survey
 from scenenet.prediction.found_towers import FoundTowers, find_in_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
 from scenenet.prediction.survey_prediction import FurtherModel, SurveyPrediction
-from scenenet.prediction.used_models import ModelPaths, UsedModel, use_models
+from scenenet.prediction.used_models import ModelPaths, UsedModel, finds_lines, use_models
 from scenenet.prediction.work.block_file import BlockFile
 from scenenet.prediction.work.survey_work import SurveyWork
 from scenenet.prediction.work.tile_predictions import TilePredictions
@@ -53,6 +56,7 @@ def predict_survey(
     detection: DetectionSettings,
     work: WorkFolder | None = None,
     scheme: ClassScheme | None = None,
+    clearance: ClearanceSettings | None = None,
 ) -> Iterator[SurveyPrediction]:
     """Predict every occupied voxel of a survey and, with a model of towers, find its towers.
 
@@ -73,7 +77,9 @@ def predict_survey(
         models: model file with tau, or several for different targets.
         work: folder for the files between the stages, with those of an earlier call that was
             stopped; None for a temporary one.
-        scheme: of the class codes in the survey (``use_models``).
+        scheme: of the class codes in the survey (``use_models``); where lines are found, they say
+            what is near the conductors.
+        clearance: how the clearances of these lines are measured; None for the defaults.
 
     Raises:
         InputError: the survey or a model cannot be used.
@@ -90,7 +96,8 @@ def predict_survey(
     place = temporary_directory() if work is None else work.folder
     check_space({place: size - (0 if work is None else work.bytes_kept())})
     with nullcontext(work) if work is not None else _scratch() as folder:
-        _read_files(survey, folder, layers, settings.chunk_points)
+        classes = scheme is not None and finds_lines(used)
+        _read_files(survey, folder, layers, settings.chunk_points, classes=classes)
         joined = SurveyWork.open(survey, folder.reads(survey))
         tiles = [_predict_files(joined, folder, each) for each in used]
         found = FoundTowers.none()
@@ -105,6 +112,7 @@ def predict_survey(
             FurtherModel(each, joined.spool_at(each.layer), predicted)
             for each, predicted in zip(used[1:], tiles[1:], strict=True)
         ]
+        line = _line(joined, folder, found, further) if first.target.is_tower else None
         yield SurveyPrediction.of(
             joined,
             tiles[0],
@@ -116,7 +124,9 @@ def predict_survey(
             started=started,
             code=first.code,
             further=further,
-            line=_line(joined, folder, found, further) if first.target.is_tower else None,
+            line=line,
+            clearance=clearance,
+            clearances=_clearances(joined, folder, found, line, clearance, scheme),
         )
 
 
@@ -132,16 +142,22 @@ def _scratch() -> Iterator[WorkFolder]:
 
 
 def _read_files(
-    survey: SurveyFiles, folder: WorkFolder, layers: Sequence[Layer], chunk_points: int
+    survey: SurveyFiles,
+    folder: WorkFolder,
+    layers: Sequence[Layer],
+    chunk_points: int,
+    *,
+    classes: bool,
 ) -> None:
     """Read the files that are not in ``folder`` yet, for different layers; points are kept in
-    tiles of the first one."""
+    tiles of the first one, with their ``classes`` if they are asked for."""
     first, *further = layers
     names, reads = survey.names, folder.reads(survey)
 
     def read(path: Path) -> None:
         named = path, names[path], reads[path]
-        read_file(*named, first.voxel_size, chunk_points, survey.crs, further=further)
+        size, crs = first.voxel_size, survey.crs
+        read_file(*named, size, chunk_points, crs, further=further, classes=classes)
 
     left = [path for path, out in reads.items() if not out.exists()]
     _each(left, f"{survey.given.name}: files read", read)
@@ -184,6 +200,26 @@ def _line(
                 write_json(folder.line, line.to_json())
             return SurveyLine.from_json(read_json(folder.line))
     return None
+
+
+def _clearances(
+    joined: SurveyWork,
+    folder: WorkFolder,
+    found: FoundTowers,
+    line: SurveyLine | None,
+    settings: ClearanceSettings | None,
+    scheme: ClassScheme | None,
+) -> SurveyClearances | None:
+    """What is near the lines of a survey; None where none were looked for."""
+    if line is None:
+        return None
+    if not folder.clearances.exists():
+        label = f"{joined.survey.given.name}: clearances measured"
+        measured = find_clearances_in_survey(
+            joined.spool, line, found.structures, settings or ClearanceSettings(), scheme, label
+        )
+        write_json(folder.clearances, measured.to_json())
+    return SurveyClearances.from_json(read_json(folder.clearances))
 
 
 def _each(items: Sequence[Item], label: str, step: Callable[[Item], None]) -> None:

@@ -23,6 +23,10 @@ RESULT_BYTES = 12
 mobile surveys: 11.4."""
 
 
+LINE_TABLES = (".spans.csv", ".conductors.csv", ".clearances.csv")
+"""What follows the name of the survey in the names of the tables of its lines."""
+
+
 @dataclass(frozen=True)
 class PredictionFiles:
     """The files of a prediction.
@@ -36,7 +40,8 @@ class PredictionFiles:
         page: the page of the survey (HTML); None for no page.
         status: a row per file of the survey (CSV); None for a survey that is one file.
         copc: whether each file of the points is also written as COPC (``copc_of``).
-        line_tables: the spans and the conductors (CSV); None where no lines are looked for.
+        line_tables: the spans, the conductors and the clearances (CSV); None where no lines are
+            looked for.
     """
 
     points: Mapping[Path, Path]
@@ -47,7 +52,7 @@ class PredictionFiles:
     page: Path | None = None
     status: Path | None = None
     copc: bool = False
-    line_tables: tuple[Path, Path] | None = None
+    line_tables: tuple[Path, Path, Path] | None = None
 
     @classmethod
     def of(
@@ -84,11 +89,9 @@ class PredictionFiles:
             page=folder / f"{survey.name}.html" if towers else None,
             status=place / "status.csv" if survey.tiled else None,
             copc=copc,
-            line_tables=(
-                (folder / f"{survey.name}.spans.csv", folder / f"{survey.name}.conductors.csv")
-                if line
-                else None
-            ),
+            line_tables=tuple(folder / (survey.name + end) for end in LINE_TABLES)  # type: ignore[arg-type]
+            if line
+            else None,
         )
 
     @property
@@ -113,7 +116,7 @@ class PredictionFiles:
         if self.table is None:
             endings += (".towers.geojson", ".towers.csv", ".html")
         if self.line_tables is None:
-            endings += (".spans.csv", ".conductors.csv")
+            endings += LINE_TABLES
         name = self.summary.name.removesuffix(SUMMARY)
         paths = (self.summary.with_name(name + ending) for ending in endings)
         return [path for path in paths if path.exists() and self.is_own(path)]

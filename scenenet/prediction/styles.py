@@ -48,6 +48,25 @@ STYLES: Mapping[str, str] = {
         outline_color="60,60,60,255",
         size="3",
     ),
+    "clearances": _style(
+        "line",
+        "SimpleLine",
+        LABELS.format(
+            field="if(&quot;what&quot; = 'danger', "
+            "round(&quot;distance&quot;, 1) || ' m to ' || &quot;kind&quot;, '')"
+        ),
+        line_color="214,39,40,255",
+        line_width="0.4",
+    ),
+    "fall_trees": _style(
+        "marker",
+        "SimpleMarker",
+        LABELS.format(field="round(&quot;height&quot;) || ' m'"),
+        name="circle",
+        color="230,126,34,255",
+        outline_color="60,60,60,255",
+        size="2.6",
+    ),
     "conductors": _style("line", "SimpleLine", line_color="41,98,165,255", line_width="0.4"),
     "spans": _style(
         "line",

@@ -38,8 +38,9 @@ class PredictionSummary:
             later prediction replaces these files only if they are unchanged.
         targets: of each model, that of the attributes above first: its target, name, tau, voxel
             size (m), kernel size (voxels) and the number of points taken for the target.
-        line: numbers of lines, spans, conductors, earth wires, cables and places to look at, and
-            what positions of wires are; None if lines were not looked for.
+        line: numbers of lines, spans, conductors, earth wires, cables and places to look at, what
+            positions of wires are, and the counts of clearances; None if lines were not looked
+            for.
     """
 
     survey: str

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenenet.clearance.records import SurveyClearances
+from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.errors import warn
 from scenenet.core.unchanged import FileState
 from scenenet.detection.settings import DetectionSettings
@@ -75,6 +77,8 @@ class SurveyPrediction:
         further: the other models.
         line: its lines, m; None if they were not looked for: that needs a model of towers and one
             of wires.
+        clearance: settings of ``clearances``; None for the defaults.
+        clearances: what is near the lines, m; None if they were not looked for.
     """
 
     survey: SurveyFiles
@@ -92,6 +96,8 @@ class SurveyPrediction:
     code: int | None = TOWER_CODE
     further: tuple[FurtherModel, ...] = ()
     line: SurveyLine | None = None
+    clearance: ClearanceSettings | None = None
+    clearances: SurveyClearances | None = None
 
     @classmethod
     def of(
@@ -108,6 +114,8 @@ class SurveyPrediction:
         code: int | None = TOWER_CODE,
         further: Sequence[FurtherModel] = (),
         line: SurveyLine | None = None,
+        clearance: ClearanceSettings | None = None,
+        clearances: SurveyClearances | None = None,
     ) -> SurveyPrediction:
         """What was read, predicted and found."""
         return cls(
@@ -126,6 +134,8 @@ class SurveyPrediction:
             code=code,
             further=tuple(further),
             line=line,
+            clearance=clearance,
+            clearances=clearances,
         )
 
     @property

@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from scenenet.clearance.records import SurveyClearances
+from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, write_json
 from scenenet.core.provenance import fingerprint, package_version
@@ -17,6 +19,7 @@ from scenenet.detection.survey_tower import row_types
 from scenenet.line.records import AS_FLOWN, SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.copc import write_copc
+from scenenet.prediction.clearance_lists import write_clearance_layers, write_clearances_csv
 from scenenet.prediction.file_status import write_status
 from scenenet.prediction.line_lists import (
     write_conductors_csv,
@@ -44,6 +47,7 @@ def predict_to_files(
     detection: DetectionSettings,
     code: str | None = None,
     scheme: ClassScheme | None = None,
+    clearance: ClearanceSettings | None = None,
 ) -> PredictionSummary:
     """Predict a survey and write the classified points, the tower list and the summary.
 
@@ -60,6 +64,7 @@ def predict_to_files(
         code: digest of the code; a run goes on where one with the same code was stopped. None for
             the version of the package.
         scheme: of the class codes in the survey (``scenenet.prediction.used_models.use_models``).
+        clearance: how clearances of lines are measured; None for the defaults.
 
     Raises:
         InputError: the survey or a model cannot be used, or ``files`` has tower lists and no model
@@ -79,11 +84,11 @@ def predict_to_files(
         work = None
         if files.work is not None:
             made_by = _made_by(
-                survey, models, settings, detection, code or package_version(), scheme
+                survey, models, settings, detection, code or package_version(), scheme, clearance
             )
             work = stack.enter_context(resumable(files.work, survey, made_by))
         prediction = stack.enter_context(
-            predict_survey(survey, models, settings, detection, work, scheme)
+            predict_survey(survey, models, settings, detection, work, scheme, clearance)
         )
         prediction.warn()
         return _write_all(prediction, files, work)
@@ -145,10 +150,11 @@ def _write_lists(
     if files.table is not None:
         write_csv(lists[files.table], prediction.towers, row_types(prediction.geneos))
     if files.line_tables is not None and prediction.line is not None:
-        for path, write in zip(
-            files.line_tables, (write_spans_csv, write_conductors_csv), strict=True
-        ):
-            write(lists[path], prediction.line, prediction.unit_sizes)
+        spans, conductors, clearances = (lists[path] for path in files.line_tables)
+        write_spans_csv(spans, prediction.line, prediction.unit_sizes)
+        write_conductors_csv(conductors, prediction.line, prediction.unit_sizes)
+        if prediction.clearances is not None:
+            write_clearances_csv(clearances, prediction.clearances, prediction.unit_sizes)
     if files.page is not None:
         write_page(prediction, lists[files.page])
     if files.status is not None:
@@ -166,11 +172,13 @@ def _made_by(
     detection: DetectionSettings,
     code: str,
     scheme: ClassScheme | None,
+    clearance: ClearanceSettings | None,
 ) -> dict[str, Any]:
     """All that decides on the results of a survey besides its files, as JSON holds it."""
     return {
         "models": [fingerprint(path) for path in paths_of(models)],
         "scheme": None if scheme is None else scheme.name,
+        "clearance": None if clearance is None else clearance.model_dump(mode="json"),
         "settings": settings.model_dump(mode="json"),
         "detection": detection.model_dump(mode="json"),
         "crs": None if survey.crs is None else survey.crs.srs,
@@ -181,7 +189,14 @@ def _made_by(
 def write_layers(prediction: SurveyPrediction, geopackage: Path) -> None:
     """Write the layers of the GeoPackage."""
     line, crs, sizes = prediction.line, prediction.crs, prediction.unit_sizes
-    more = None if line is None else lambda path: write_line_layers(path, line, crs, sizes)
+    clearances = prediction.clearances
+
+    def more(path: Path) -> list[str]:
+        names = [] if line is None else write_line_layers(path, line, crs, sizes)
+        if clearances is not None:
+            names += write_clearance_layers(path, clearances, crs, sizes)
+        return names
+
     write_geopackage(
         geopackage,
         prediction.towers if prediction.finds_towers else None,
@@ -197,7 +212,9 @@ def write_layers(prediction: SurveyPrediction, geopackage: Path) -> None:
 
 def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> PredictionSummary:
     """The summary of a prediction with the files ``outputs``; ``seconds`` counts up to now."""
-    detection = {"detection": prediction.detection.model_dump()}
+    further: dict[str, Any] = {"detection": prediction.detection.model_dump()}
+    if prediction.clearances is not None:
+        further["clearance"] = (prediction.clearance or ClearanceSettings()).model_dump()
     crs = prediction.crs
     return PredictionSummary(
         survey=str(prediction.survey.given),
@@ -217,15 +234,15 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         ],
         files=[file.to_json(prediction.target_names) for file in prediction.files],
         seconds=time.perf_counter() - prediction.started,
-        settings=prediction.settings.model_dump() | detection,
+        settings=prediction.settings.model_dump() | further,
         model_provenance=prediction.card.provenance,
         outputs=outputs,
         targets=_targets(prediction),
-        line=None if prediction.line is None else _line(prediction.line),
+        line=None if prediction.line is None else _line(prediction.line, prediction.clearances),
     )
 
 
-def _line(line: SurveyLine) -> dict[str, Any]:
+def _line(line: SurveyLine, clearances: SurveyClearances | None) -> dict[str, Any]:
     """What ``PredictionSummary.line`` says."""
     kinds = [conductor.kind for conductor in line.conductors]
     return {
@@ -236,6 +253,7 @@ def _line(line: SurveyLine) -> dict[str, Any]:
         "cables": kinds.count("cable"),
         "to_look_at": len(line.notes),
         "positions": AS_FLOWN,
+        "clearances": None if clearances is None else clearances.counts(),
     }
 
 

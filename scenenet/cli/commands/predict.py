@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from scenenet.clearance.limits_file import COLUMNS
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
@@ -29,6 +30,7 @@ from scenenet.pointcloud.targets import WIRE, Target
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from scenenet.clearance.settings import ClearanceSettings
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.used_models import UsedModel
 
@@ -69,8 +71,9 @@ def command(
         Codes | None,
         typer.Option(
             "--codes",
-            help="With --classify and a model of target wire: class scheme of the survey, whose "
-            f"code wires get ({_WIRE_CODES}).",
+            help="Class scheme of the survey, with a model of target wire: its classes say what is "
+            "near the conductors, and with --classify wires get its code "
+            f"({_WIRE_CODES}).",
         ),
     ] = None,
     classify_from: Annotated[
@@ -79,6 +82,23 @@ def command(
             metavar="CODES",
             help="With --classify: the class codes that may be replaced, such as 0,1,5.  [default: "
             "every code]",
+        ),
+    ] = None,
+    voltage: Annotated[
+        float | None,
+        typer.Option(
+            metavar="KV",
+            min=0.1,
+            help="With models of towers and wires: nominal voltage of the lines in kV, by which "
+            "limits for clearances are chosen.  [default: no limits]",
+        ),
+    ] = None,
+    limits: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="With --voltage: limits for clearances (CSV) with the columns "
+            f"{', '.join(COLUMNS)}.  [default: examples, docs/guides/clearances.md]",
         ),
     ] = None,
     copc: Annotated[
@@ -115,6 +135,10 @@ def command(
     the layers spans, conductors and line_notes, and each point the numbers of its span and
     conductor. Positions are those of the flight, not those at another temperature, load or wind.
 
+    NAME.clearances.csv: with these models, a row per span, the worst first: how near ground,
+    vegetation, buildings and other wires are to its conductors, and with --voltage how many places
+    are closer than the limits. NAME.gpkg then has the layers clearances and fall_trees.
+
     NAME.html: a page with a map, the list of the towers, and each tower in plan and profile with
     its reasons and what to check. It needs no other file and no network.
 
@@ -144,6 +168,7 @@ def command(
     system = coordinate_system(crs)
     if copc:
         require_pdal()
+    clearance = _clearance(voltage, limits)
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
     towers, line = model == [packaged_model()], False
@@ -168,7 +193,7 @@ def command(
     for given in seen:
         with failures.collect():
             summary = writers.predict_to_files(
-                named[given], model, files[given], settings, detection, code, scheme
+                named[given], model, files[given], settings, detection, code, scheme, clearance
             )
             summaries.append(summary.to_json())
             for file in summary.files:
@@ -192,10 +217,30 @@ def _line(summary: dict[str, Any]) -> str:
     if summary["line"] is not None:
         wires = summary["line"]
         found.append(f"{wires['spans']} spans with {wires['conductors']} conductors")
+        if wires["clearances"] and wires["clearances"]["dangers"]:
+            found.append(f"{wires['clearances']['dangers']} places closer than the limits")
         if wires["to_look_at"]:
             found.append(f"{wires['to_look_at']} places to look at (layer line_notes)")
     line = f"{summary['survey']}: {', '.join(found)} among {summary['points']:,} points"
     return line if summary["towers"] is not None else f"{line}; towers were not looked for"
+
+
+def _clearance(voltage: float | None, limits: Path | None) -> ClearanceSettings:
+    """How clearances are measured.
+
+    Raises:
+        typer.BadParameter: there are limits, and no voltage.
+        InputError: the limits cannot be used, or have none for the voltage.
+    """
+    from scenenet.clearance.limits_file import read_limits
+    from scenenet.clearance.settings import ClearanceSettings
+
+    if limits is not None and voltage is None:
+        raise typer.BadParameter("needs --voltage", param_hint="--limits")
+    given = {} if limits is None else {"limits": read_limits(limits)}
+    settings = ClearanceSettings(voltage=voltage, **given)
+    settings.applied()  # fail before the work
+    return settings
 
 
 def _require_codes(

@@ -7,7 +7,7 @@ coordinates. The prediction of a tile is therefore the same wherever a survey is
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from types import MappingProxyType
@@ -33,6 +33,9 @@ _OFFSET = np.dtype("<f4")
 SPOOLED_KINDS = VOXELS, POINTS = ("voxels", "points")
 """Blocks of each tile: its occupied voxels, and its points."""
 
+CLASSES = "classes"
+"""Blocks with the class codes of the points, where a later stage asks for them."""
+
 
 @dataclass(frozen=True)
 class Layer:
@@ -53,9 +56,11 @@ class Layer:
         return f"{VOXELS} {self.voxel_size!r} {self.measurement}".rstrip()
 
 
-def spooled_kinds(further: Iterable[Layer]) -> tuple[str, ...]:
-    """The kinds of blocks of a survey that is in ``further`` layers too."""
-    return (*SPOOLED_KINDS, *(layer.kind for layer in further))
+def spooled_kinds(further: Iterable[Layer], *, classes: bool = False) -> tuple[str, ...]:
+    """The kinds of blocks of a survey that is in ``further`` layers too, and with the class codes
+    of its points if ``classes``."""
+    own = (*SPOOLED_KINDS, CLASSES) if classes else SPOOLED_KINDS
+    return (*own, *(layer.kind for layer in further))
 
 
 @dataclass(frozen=True)
@@ -143,11 +148,17 @@ class SpoolWriter:
         self._blocks, self.lattice = blocks, lattice
         self._further = tuple(further)
 
-    def add(self, xyz: np.ndarray, steps: Mapping[str, np.ndarray] = MappingProxyType({})) -> None:
+    def add(
+        self,
+        xyz: np.ndarray,
+        steps: Mapping[str, np.ndarray] = MappingProxyType({}),
+        classes: np.ndarray | None = None,
+    ) -> None:
         """Add points (n, 3) m to their tiles.
 
         Args:
             steps: (n,) what the measurement of each layer says about them, by its name.
+            classes: (n,) uint8 class codes; None where they are not kept.
 
         Raises:
             InputError: a coordinate is outside the lattice.
@@ -155,6 +166,8 @@ class SpoolWriter:
         for code, rows in self._add_voxels(VOXELS, self.lattice, xyz, None):
             offset = xyz[rows] - self.lattice.corner(code)
             self._blocks.add(POINTS, code, offset.astype(_OFFSET))
+            if classes is not None:
+                self._blocks.add(CLASSES, code, classes[rows].astype(np.uint8))
         for layer in self._further:
             lattice, values = Lattice(layer.voxel_size), steps.get(layer.measurement)
             for _ in self._add_voxels(layer.kind, lattice, xyz, values):
@@ -241,10 +254,29 @@ class TileSpool:
         Raises:
             ValueError: the spool is that of voxels of a further size.
         """
+        offset = self._offsets(code)
+        return offset[_by_height(offset)] + self.lattice.corner(code)
+
+    def classified_points(self, code: int) -> tuple[np.ndarray, np.ndarray]:
+        """As ``points``, with the class codes (n,) uint8 of the points, which the files keep.
+
+        Raises:
+            ValueError: the spool is that of voxels of a further size.
+        """
+        offset, classes = self._offsets(code), self._read(CLASSES, code, np.dtype(np.uint8))
+        order = _by_height(offset)
+        return offset[order] + self.lattice.corner(code), classes[order]
+
+    def _offsets(self, code: int) -> np.ndarray:
+        """(n, 3) float32 m, points of a tile from its corner, as they were added."""
         if self.kind != VOXELS:
             raise ValueError(f"there are no points in tiles of {self.voxel_size:g} m voxels")
-        offset = self._read(POINTS, code, _OFFSET).reshape(-1, 3)
-        return offset[_by_height(offset)] + self.lattice.corner(code)
+        return self._read(POINTS, code, _OFFSET).reshape(-1, 3)
+
+    def columns(self) -> Mapping[tuple[int, int], Sequence[int]]:
+        """(x, y) number of each column of tiles (``Lattice.columns``) -> the codes of its tiles
+        that hold a point."""
+        return {(x, y): codes for (y, x), codes in self._columns.items()}
 
     def around(self, place: tuple[int, int, int], reach: tuple[int, int, int]) -> Tile:
         """A tile together with its neighbours up to ``reach`` (z, y, x) voxels away.

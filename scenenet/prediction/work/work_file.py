@@ -123,6 +123,8 @@ def read_file(
     crs: pyproj.CRS | None = None,
     planned: PlannedFile | None = None,
     further: Sequence[Layer] = (),
+    *,
+    classes: bool = False,
 ) -> SurveyFile:
     """Read a survey file into a work file. Memory is bounded by a chunk of points.
 
@@ -137,19 +139,24 @@ def read_file(
         crs: system of a file that states none; None if it is not known.
         planned: what another process expects of the file; None if nothing was expected.
         further: further layers of voxels, for models that observe other ones.
+        classes: whether the class codes of the points are kept.
 
     Raises:
         OutputError: the work file cannot be written.
     """
     with atomic(out) as partial, partial.open("wb") as stream:
-        blocks, lattice = BlockWriter(stream, spooled_kinds(further)), Lattice(voxel_size)
+        blocks, lattice = (
+            BlockWriter(stream, spooled_kinds(further, classes=classes)),
+            Lattice(voxel_size),
+        )
         file, system = SurveyFile(path, name), None
         try:
             if planned is not None:
                 planned.require_same(path)
             info = survey_of_lengths(path, crs)
             system = SurveySystem.of(info)
-            file = _read(path, info, SpoolWriter(blocks, lattice, further), chunk_points, further)
+            spool = SpoolWriter(blocks, lattice, further)
+            file = _read(path, info, spool, chunk_points, further, classes=classes)
             file = replace(file, name=name)
             if planned is not None:
                 planned.require_inside(file, info)
@@ -167,7 +174,13 @@ def read_file(
 
 
 def _read(
-    path: Path, info: SurveyInfo, spool: SpoolWriter, chunk_points: int, further: Iterable[Layer]
+    path: Path,
+    info: SurveyInfo,
+    spool: SpoolWriter,
+    chunk_points: int,
+    further: Iterable[Layer],
+    *,
+    classes: bool,
 ) -> SurveyFile:
     """Read a file into ``spool``, which has ``further`` layers, and look at it."""
     measurements = {
@@ -185,7 +198,8 @@ def _read(
             steps = {}
             if chunk.fields is not None:
                 steps = {name: m.point_steps(chunk.fields) for name, m in measurements.items()}
-            spool.add(in_metres(chunk.xyz, info.unit_sizes), steps)
+            codes = chunk.classification if classes else None
+            spool.add(in_metres(chunk.xyz, info.unit_sizes), steps, codes)
             n_points += len(chunk)
     screening.raise_if_not_metres()
     extent = (*screening.mins[:2].tolist(), *screening.maxs[:2].tolist()) if n_points else None

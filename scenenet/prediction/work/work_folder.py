@@ -59,6 +59,11 @@ class WorkFolder:
         return self.folder / "line.json"
 
     @property
+    def clearances(self) -> Path:
+        """What is near the lines (``SurveyClearances``)."""
+        return self.folder / "clearances.json"
+
+    @property
     def written(self) -> Path:
         """Name of each file whose points were written -> what the status says about it."""
         return self.folder / "written.json"
@@ -163,6 +168,7 @@ def _keep_what_fits(work: WorkFolder, survey: SurveyFiles, made_by: Mapping[str,
             kept |= {out for out in predicted if _is_whole(out)} | {
                 work.towers,
                 work.line,
+                work.clearances,
                 work.written,
             }
         else:

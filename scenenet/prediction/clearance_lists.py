@@ -1,0 +1,63 @@
+"""The clearances of a survey as files: CSV by span, and layers of the GeoPackage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scenenet.clearance.records import (
+    CLEARANCE_COLUMNS,
+    SPAN_CLEARANCE_COLUMNS,
+    TREE_COLUMNS,
+    SurveyClearances,
+)
+from scenenet.core.columns import FieldColumn
+from scenenet.prediction.line_lists import write_rows, write_table
+
+if TYPE_CHECKING:
+    import pyproj
+
+
+def write_clearances_csv(
+    path: str | Path, clearances: SurveyClearances, sizes: tuple[float, float, float]
+) -> None:
+    """Write a row per span, the worst first.
+
+    Args:
+        sizes: sizes in m of the units of x, y and z of the survey, in which the rows are.
+    """
+    write_table(path, clearances.spans, SPAN_CLEARANCE_COLUMNS, sizes)
+
+
+def write_clearance_layers(
+    path: str | Path,
+    clearances: SurveyClearances,
+    crs: pyproj.CRS | None,
+    sizes: tuple[float, float, float],
+) -> list[str]:
+    """Add the layers ``clearances`` (LineStringZ, from the conductor to what is near) and
+    ``fall_trees`` (PointZ, the foot of the tree) to a GeoPackage, the worst first; returns their
+    names.
+
+    Args:
+        sizes: as ``write_clearances_csv``.
+    """
+    import shapely
+
+    planar, _, vertical = sizes
+    scale = np.array([planar, planar, vertical])
+    apart = [
+        shapely.LineString(np.array([(p.wire_x, p.wire_y, p.wire_z), (p.x, p.y, p.z)]) / scale)
+        for p in clearances.places
+    ]
+    feet = [shapely.Point(np.array([t.x, t.y, t.ground]) / scale) for t in clearances.trees]
+    layers: list[tuple[str, str, list[Any], Sequence[Any], Sequence[FieldColumn]]] = [
+        ("clearances", "LineString Z", apart, clearances.places, CLEARANCE_COLUMNS),
+        ("fall_trees", "Point Z", feet, clearances.trees, TREE_COLUMNS),
+    ]
+    for name, kind, geometry, rows, columns in layers:
+        write_rows(path, name, kind, geometry, rows, columns, crs, sizes)
+    return [name for name, *_ in layers]

@@ -107,7 +107,7 @@ def measure(
     trees = find_trees(around, settings.tree_height)
     inside = area.has(trees.feet)
     return MeasuredSection(
-        near_points(xyz, kind, step, conductors, limits),
+        near_points(xyz, kind, step, conductors, limits, settings.few_points),
         Trees(trees.feet[inside], trees.height[inside]),
     )
 

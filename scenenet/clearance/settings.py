@@ -72,7 +72,10 @@ class ClearanceSettings(Settings):
     )
     step: float = Field(5.0, gt=0, description="m, steps along a span of its profile")
     few_points: int = Field(
-        5, ge=1, description="a place with fewer points that are too near is marked"
+        5,
+        ge=1,
+        description="a place with fewer points that are too near is marked, and a point with fewer "
+        "of its kind within about a metre is not the nearest of its kind",
     )
     tree_height: float = Field(3.0, gt=0, description="m, smallest height of a tree")
     fall_reserve: float = Field(

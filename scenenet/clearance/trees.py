@@ -43,7 +43,7 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
     Tops are local maxima of the canopy; a lower one within the crown of a higher one is a part of
     it.
     """
-    rows = np.flatnonzero((around.kind == PLANT) & (around.height >= min_height))
+    rows = np.flatnonzero((around.kind == PLANT) & (around.height >= min_height / 2))
     none = Trees(np.empty((0, 3)), np.empty(0))
     if not len(rows):
         return none
@@ -57,6 +57,7 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
     tree = cKDTree(xy)
     near = tree.query_ball_point((np.argwhere(peaks) + cells.corner + 0.5) * CELL_M, CROWN_M)
     tops = np.unique(np.array([own[int(np.argmax(height[own]))] for own in near if own], int))
+    tops = tops[height[tops] >= min_height]
     order = tops[np.lexsort((tops, -height[tops]))]
     kept: list[int] = []
     covered = np.zeros(len(xy), bool)

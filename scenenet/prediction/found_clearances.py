@@ -13,7 +13,8 @@ from scenenet.clearance.settings import ClearanceSettings
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.prediction.work.structures import Owners, Structures
-from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.tile_predictions import TilePredictions
+from scenenet.prediction.work.tiling import TileSpool, groups
 
 KEPT_POINTS = 4_000_000
 """Points in memory besides those of a section: neighbouring sections need the same tiles."""
@@ -23,6 +24,7 @@ def find_clearances_in_survey(
     spool: TileSpool,
     line: SurveyLine,
     structures: Structures,
+    wires: WireVoxels,
     settings: ClearanceSettings,
     scheme: ClassScheme | None = None,
     progress: str | None = None,
@@ -33,6 +35,8 @@ def find_clearances_in_survey(
         spool: the points of all its files.
         line: its lines.
         structures: the shapes of its towers; their points are no obstacles.
+        wires: where the model of wires found them; their points are no obstacles either, because
+            some belong to conductors that were not traced.
         scheme: of the class codes, which ``spool`` then keeps; None where the height above ground
             says what points are.
         progress: label of the progress on stderr; None shows no progress.
@@ -40,15 +44,46 @@ def find_clearances_in_survey(
     Raises:
         InputError: the limits have none for the voltage.
     """
-    points = _AreaPoints(spool, structures, classes=scheme is not None)
+    points = _AreaPoints(spool, structures, wires, classes=scheme is not None)
     return find_clearances(line, points, settings, scheme, progress)
 
 
-class _AreaPoints:
-    """Gives the points in an area that belong to no tower, with their class codes."""
+class WireVoxels:
+    """The voxels that a model of wires is certain of."""
 
-    def __init__(self, spool: TileSpool, structures: Structures, *, classes: bool) -> None:
-        self._spool, self._classes = spool, classes
+    def __init__(self, spool: TileSpool, predictions: TilePredictions, tau: float) -> None:
+        """Read the predictions.
+
+        Args:
+            spool: the voxels that the model observes.
+            predictions: of the model, for all its tiles.
+            tau: of the model.
+        """
+        self._lattice = spool.lattice
+        self._sure: dict[int, np.ndarray] = {}
+        for code, _ in spool.places():
+            prediction = predictions.read(code)
+            sure = prediction.probability >= tau
+            if sure.any():
+                self._sure[code] = prediction.voxel[sure]
+
+    def have(self, xyz: np.ndarray) -> np.ndarray:
+        """(n,) bool: which points (n, 3) m are in them."""
+        inside = np.zeros(len(xyz), bool)
+        codes, voxels = self._lattice.locate(xyz)
+        for code, rows in groups(codes):
+            if code in self._sure:
+                inside[rows] = np.isin(voxels[rows], self._sure[code])
+        return inside
+
+
+class _AreaPoints:
+    """Gives the points in an area that belong to no tower or wire, with their class codes."""
+
+    def __init__(
+        self, spool: TileSpool, structures: Structures, wires: WireVoxels, *, classes: bool
+    ) -> None:
+        self._spool, self._wires, self._classes = spool, wires, classes
         self._columns = spool.columns()
         self._owners = Owners(structures, spool.lattice)
         self._kept: OrderedDict[int, tuple[np.ndarray, np.ndarray | None]] = OrderedDict()
@@ -67,7 +102,7 @@ class _AreaPoints:
         return found, np.concatenate(codes) if self._classes else None
 
     def _tile(self, code: int) -> tuple[np.ndarray, np.ndarray | None]:
-        """The points of a tile that belong to no tower. Those that were used last stay in
+        """The points of a tile that belong to no tower or wire. Those that were used last stay in
         memory."""
         if code not in self._kept:
             classes = None
@@ -76,6 +111,7 @@ class _AreaPoints:
             else:
                 xyz = self._spool.points(code)
             free = self._owners(xyz, np.full(len(xyz), code)) == 0
+            free &= ~self._wires.have(xyz)
             self._kept[code] = xyz[free], None if classes is None else classes[free]
             while len(self._kept) > 1 and self._held() > KEPT_POINTS:
                 self._kept.popitem(last=False)

@@ -22,7 +22,7 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.targets import WIRE
-from scenenet.prediction.found_clearances import find_clearances_in_survey
+from scenenet.prediction.found_clearances import WireVoxels, find_clearances_in_survey
 from scenenet.prediction.found_line import find_line_in_survey
 from scenenet.prediction.found_towers import FoundTowers, find_in_survey
 from scenenet.prediction.settings import PredictSettings
@@ -112,7 +112,12 @@ def predict_survey(
             FurtherModel(each, joined.spool_at(each.layer), predicted)
             for each, predicted in zip(used[1:], tiles[1:], strict=True)
         ]
-        line = _line(joined, folder, found, further) if first.target.is_tower else None
+        line, clearances = None, None
+        wires = next((each for each in further if each.used.target.name == WIRE), None)
+        if first.target.is_tower and wires is not None:
+            line = _line(joined, folder, found, wires)
+            own = clearance or ClearanceSettings()
+            clearances = _clearances(joined, folder, found, wires, line, own, scheme)
         yield SurveyPrediction.of(
             joined,
             tiles[0],
@@ -126,7 +131,7 @@ def predict_survey(
             further=further,
             line=line,
             clearance=clearance,
-            clearances=_clearances(joined, folder, found, line, clearance, scheme),
+            clearances=clearances,
         )
 
 
@@ -182,41 +187,38 @@ def _predict_files(joined: SurveyWork, folder: WorkFolder, used: UsedModel) -> T
 
 
 def _line(
-    joined: SurveyWork, folder: WorkFolder, found: FoundTowers, further: Sequence[FurtherModel]
-) -> SurveyLine | None:
-    """The lines between the towers of a survey; None without a model of wires."""
-    for model in further:
-        if model.used.target.name == WIRE:
-            if not folder.line.exists():
-                line = find_line_in_survey(
-                    joined.spool,
-                    model.spool,
-                    model.tiles,
-                    model.used.card.threshold(),
-                    found.towers,
-                    joined.system.unit_sizes,
-                    f"{joined.survey.given.name}: spans traced",
-                )
-                write_json(folder.line, line.to_json())
-            return SurveyLine.from_json(read_json(folder.line))
-    return None
+    joined: SurveyWork, folder: WorkFolder, found: FoundTowers, wires: FurtherModel
+) -> SurveyLine:
+    """The lines between the towers of a survey."""
+    if not folder.line.exists():
+        line = find_line_in_survey(
+            joined.spool,
+            wires.spool,
+            wires.tiles,
+            wires.used.card.threshold(),
+            found.towers,
+            joined.system.unit_sizes,
+            f"{joined.survey.given.name}: spans traced",
+        )
+        write_json(folder.line, line.to_json())
+    return SurveyLine.from_json(read_json(folder.line))
 
 
 def _clearances(
     joined: SurveyWork,
     folder: WorkFolder,
     found: FoundTowers,
-    line: SurveyLine | None,
-    settings: ClearanceSettings | None,
+    wires: FurtherModel,
+    line: SurveyLine,
+    settings: ClearanceSettings,
     scheme: ClassScheme | None,
-) -> SurveyClearances | None:
-    """What is near the lines of a survey; None where none were looked for."""
-    if line is None:
-        return None
+) -> SurveyClearances:
+    """What is near the lines of a survey."""
     if not folder.clearances.exists():
+        voxels = WireVoxels(wires.spool, wires.tiles, wires.used.card.threshold())
         label = f"{joined.survey.given.name}: clearances measured"
         measured = find_clearances_in_survey(
-            joined.spool, line, found.structures, settings or ClearanceSettings(), scheme, label
+            joined.spool, line, found.structures, voxels, settings, scheme, label
         )
         write_json(folder.clearances, measured.to_json())
     return SurveyClearances.from_json(read_json(folder.clearances))

@@ -120,6 +120,7 @@ def _own(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:
         low = min(curve.start[2], curve.end[2]) - conductor.sag - reach
         near = np.flatnonzero((xyz[:, 2] >= low) & ~own)
         s, t = curve.along(xyz[near])
-        near = near[(np.abs(t) <= reach) & (s >= -reach) & (s <= curve.length + reach)]
+        along = (s >= -reach) & (s <= curve.length + reach)
+        near = near[along & (np.abs(t) <= reach + abs(curve.blowout))]
         own[near] = np.hypot(*curve.residuals(xyz[near])) <= reach
     return own

@@ -66,6 +66,11 @@ class Catenary:
         """Rise (n,) per horizontal metre at distances s (n,) m from the start."""
         return np.sinh((s - self.lowest) / self.parameter)
 
+    def left(self, s: np.ndarray) -> np.ndarray:
+        """m (n,), how far wind moves the wire to the left of the straight line in plan at distances
+        s (n,) m from the start."""
+        return self._blown(s / self.length)
+
     def at(self, s: np.ndarray) -> np.ndarray:
         """Points (n, 3), m, at horizontal distances s (n,) m from the start."""
         return self.at_shares(np.asarray(s, float) / self.length)

@@ -47,9 +47,12 @@ def span(number: int, line: int, ends, start: int = 0, to: int = 0) -> LineSpan:
 
 
 def wire_of(curve: Catenary, span_id: int, number: int, kind: str = "conductor") -> Conductor:
+    facts = {"points": 0, "seen": 1.0, "rmse": 0.0, "from_height": 0.0, "to_height": 0.0}
     return Conductor(
-        curve, 0.25, span_id, number, kind, 1, 0, 0, curve.parameter, curve.sag, curve.length,
-        0.0, 0, 1.0, curve.start[2], curve.end[2], 0.0, 0.0,
+        catenary=curve, tube=0.25, span_id=span_id, conductor_id=number, kind=kind,
+        subconductors=1, from_tower=0, to_tower=0, c=curve.parameter, sag=curve.sag,
+        blowout=curve.blowout, length=curve.length, from_z=curve.start[2], to_z=curve.end[2],
+        **facts,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -30,6 +31,13 @@ MIN_GROUND = 50
 """Points with a class of ground from which the ground model is made of them."""
 
 
+CUBE_M = 1.0
+"""m, edge of the cubes in which a point has others around it: in its own and the next ones."""
+
+SPARSE = 0.5
+"""Share of lone points from which they show how few points the survey has, not what they are."""
+
+
 @dataclass(frozen=True)
 class Surroundings:
     """Points around a section of a line.
@@ -38,12 +46,14 @@ class Surroundings:
         xyz: (n, 3) m.
         kind: (n,) int8, number of the kind, or ``NO_OBSTACLE``.
         height: (n,) m above the ground.
+        lone: (n,) bool, which have few of their kind around them.
         ground: below them.
     """
 
     xyz: np.ndarray
     kind: np.ndarray
     height: np.ndarray
+    lone: np.ndarray
     ground: GroundModel
 
 
@@ -68,13 +78,14 @@ def kind_table(scheme: ClassScheme) -> np.ndarray:
 
 
 def surroundings(
-    xyz: np.ndarray, codes: np.ndarray | None, scheme: ClassScheme | None
+    xyz: np.ndarray, codes: np.ndarray | None, scheme: ClassScheme | None, few: int
 ) -> Surroundings:
     """The kinds of points (n, 3) m, of which none belongs to a line.
 
     Args:
         codes: (n,) uint8 class codes; None where only the heights decide.
         scheme: of the codes.
+        few: a point with fewer of its kind around it, itself among them, is a lone one.
     """
     known = np.full(len(xyz), BY_HEIGHT, np.int8)
     if scheme is not None and codes is not None:
@@ -83,7 +94,7 @@ def surroundings(
         xyz, known = xyz[kept], known[kept]
     if not len(xyz):
         flat = GroundModel(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)))
-        return Surroundings(xyz, known, np.empty(0), flat)
+        return Surroundings(xyz, known, np.empty(0), np.empty(0, bool), flat)
     box = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
     on_ground = known == ON_GROUND
     if on_ground.sum() >= MIN_GROUND:
@@ -95,7 +106,7 @@ def surroundings(
     by_height = np.where(height <= band, ON_GROUND, PLANT)
     by_height[(height < -BELOW_M) | _in_the_air(xyz[:, :2], height)] = NO_OBSTACLE
     kind = np.where(known == BY_HEIGHT, by_height, known).astype(np.int8)
-    return Surroundings(xyz, kind, height, ground)
+    return Surroundings(xyz, kind, height, lone_points(xyz, kind, few), ground)
 
 
 def _in_the_air(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
@@ -120,3 +131,30 @@ def _in_the_air(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
     first = np.maximum.accumulate(np.where(starts, np.arange(len(gaps)), 0))
     found[order] = gaps > before[first]
     return found
+
+
+def lone_points(xyz: np.ndarray, kind: np.ndarray, few: int) -> np.ndarray:
+    """(n,) bool: which points (n, 3) m of kinds (n,) have fewer than ``few`` of their kind in the
+    cubes around them; none of a kind that is sparse altogether, and none on the ground.
+
+    They are mostly returns from the air, from birds or dust.
+    """
+    lone = np.zeros(len(xyz), bool)
+    for number in (PLANT, HOUSE):
+        rows = np.flatnonzero(kind == number)
+        if not len(rows):
+            continue
+        at = np.floor(xyz[rows] / CUBE_M).astype(np.int64)
+        at -= at.min(axis=0) - 1
+        size = at.max(axis=0) + 2
+        flat = (at[:, 0] * size[1] + at[:, 1]) * size[2] + at[:, 2]
+        cubes, cube, count = np.unique(flat, return_inverse=True, return_counts=True)
+        around = np.zeros(len(cubes), np.int64)
+        for x, y, z in product((-1, 0, 1), repeat=3):
+            other = cubes + (x * size[1] + y) * size[2] + z
+            found = np.minimum(np.searchsorted(cubes, other), len(cubes) - 1)
+            around += np.where(cubes[found] == other, count[found], 0)
+        few_around = around[cube] < few
+        if few_around.mean() <= SPARSE:
+            lone[rows] = few_around
+    return lone

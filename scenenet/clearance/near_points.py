@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -14,12 +13,6 @@ from scenenet.line.records import Conductor
 
 POINT_KINDS = KINDS[:3]
 """The kinds of points; wires are measured as catenaries."""
-
-CUBE_M = 1.0
-"""m, edge of the cubes in which a point has others around it: in its own and the next ones."""
-
-SPARSE = 0.5
-"""Share of lone points from which they show how few points the survey has, not what they are."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +80,7 @@ def near_points(
     step: np.ndarray,
     conductors: Sequence[Conductor],
     limits: ClearanceLimits | None,
-    few: int,
+    lone: np.ndarray,
 ) -> Near:
     """The nearest of points to conductors, and those that are too near.
 
@@ -97,13 +90,12 @@ def near_points(
         xyz: (n, 3) m.
         kind: (n,) number in ``POINT_KINDS``.
         step: (n,) number of the step along the span.
-        few: a point with fewer of its kind around it, itself among them, is a lone one.
+        lone: (n,) bool, which points are lone ones.
         conductors: of the span.
         limits: for the voltage; earth wires have none. None without a voltage.
     """
     limit_of = np.array([limits.of(name) if limits else 0.0 for name in POINT_KINDS])
     cell = step * len(POINT_KINDS) + kind
-    lone = lone_points(xyz, kind, few)
     nearest: list[NearPoint] = []
     steps: dict[int, NearPoint] = {}
     closest, owner, at = np.full(len(xyz), np.inf), np.zeros(len(xyz), int), np.zeros(len(xyz))
@@ -143,30 +135,3 @@ def near_points(
     too_near = TooNear(xyz[found], kind[found], owner[found], at[found], closest[found])
     by_step = tuple((each // len(POINT_KINDS), steps[each]) for each in sorted(steps))
     return Near(tuple(nearest), by_step, too_near)
-
-
-def lone_points(xyz: np.ndarray, kind: np.ndarray, few: int) -> np.ndarray:
-    """(n,) bool: which points (n, 3) m of kinds (n,) have fewer than ``few`` of their kind in the
-    cubes around them; none of a kind that is sparse altogether, and none on the ground.
-
-    They are mostly returns from the air, from birds or dust.
-    """
-    lone = np.zeros(len(xyz), bool)
-    for number in range(1, len(POINT_KINDS)):
-        rows = np.flatnonzero(kind == number)
-        if not len(rows):
-            continue
-        at = np.floor(xyz[rows] / CUBE_M).astype(np.int64)
-        at -= at.min(axis=0) - 1
-        size = at.max(axis=0) + 2
-        flat = (at[:, 0] * size[1] + at[:, 1]) * size[2] + at[:, 2]
-        cubes, cube, count = np.unique(flat, return_inverse=True, return_counts=True)
-        around = np.zeros(len(cubes), np.int64)
-        for x, y, z in product((-1, 0, 1), repeat=3):
-            other = cubes + (x * size[1] + y) * size[2] + z
-            found = np.minimum(np.searchsorted(cubes, other), len(cubes) - 1)
-            around += np.where(cubes[found] == other, count[found], 0)
-        few_around = around[cube] < few
-        if few_around.mean() <= SPARSE:
-            lone[rows] = few_around
-    return lone

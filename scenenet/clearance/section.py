@@ -98,7 +98,7 @@ def measure(
     xyz, codes = points(wide)
     free = ~_own(xyz, [*conductors, *others])
     xyz, codes = xyz[free], None if codes is None else codes[free]
-    around = surroundings(xyz, codes, scheme)
+    around = surroundings(xyz, codes, scheme, settings.few_points)
     here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
     xyz, kind = around.xyz[here], around.kind[here]
     last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)
@@ -107,7 +107,7 @@ def measure(
     trees = find_trees(around, settings.tree_height)
     inside = area.has(trees.feet)
     return MeasuredSection(
-        near_points(xyz, kind, step, conductors, limits, settings.few_points),
+        near_points(xyz, kind, step, conductors, limits, around.lone[here]),
         Trees(trees.feet[inside], trees.height[inside]),
     )
 

@@ -36,7 +36,7 @@ class ClearanceLimits(Settings):
 
 SOURCE = (
     "examples, to be replaced by the rules that hold for the line: ground, buildings and crossing "
-    "lines after the Indian Electricity Rules 1956 (rules 77, 80 and 87), vegetation after the New "
+    "lines after the Indian Electricity Rules 1956, vegetation after the New "
     "Zealand Electricity (Hazards from Trees) Regulations 2003, schedule (spans up to 150 m)"
 )
 """Where the numbers of ``DEFAULT_LIMITS`` are from (docs/guides/clearances.md)."""

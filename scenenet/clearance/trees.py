@@ -43,7 +43,8 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
     Tops are local maxima of the canopy; a lower one within the crown of a higher one is a part of
     it.
     """
-    rows = np.flatnonzero((around.kind == PLANT) & (around.height >= min_height / 2))
+    joined = (around.kind == PLANT) & ~around.lone
+    rows = np.flatnonzero(joined & (around.height >= min_height / 2))
     none = Trees(np.empty((0, 3)), np.empty(0))
     if not len(rows):
         return none

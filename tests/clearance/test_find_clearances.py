@@ -7,6 +7,7 @@ from itertools import groupby
 
 import numpy as np
 import pytest
+from fixtures.true_line import span_of, true_line, wire_of
 from scipy.spatial import cKDTree
 
 from scenenet.clearance.find_clearances import find_clearances
@@ -14,10 +15,10 @@ from scenenet.clearance.records import SurveyClearances
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.errors import InputError
 from scenenet.line.catenary import Catenary
-from scenenet.line.records import AS_FLOWN, Conductor, LineSpan, SurveyLine
+from scenenet.line.records import AS_FLOWN, SurveyLine
 from scenenet.pointcloud.class_schemes import EDP
 from scenenet.synthetic.codes import CONDUCTOR, GRASS, SCRUB, TALL, TOWER, TREE
-from scenenet.synthetic.corridor import Corridor, make_corridor
+from scenenet.synthetic.corridor import make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
 
 KV = 66.0
@@ -26,46 +27,16 @@ SETTINGS = ClearanceSettings(voltage=KV)
 LIMITS = SETTINGS.applied()
 
 
-def true_line(corridor: Corridor) -> SurveyLine:
-    """The line with its true catenaries."""
-    spans, conductors = [], []
-    grouped = groupby(corridor.conductors, key=lambda wire: wire.from_tower)
-    for order, (start, wires) in enumerate(grouped, 1):
-        curves = [wire.catenary for wire in wires]
-        ends = [np.mean([getattr(c, end)[:2] for c in curves], axis=0) for end in ("start", "end")]
-        to = start + 1 if start < corridor.settings.towers else 0
-        spans.append(span(order, 1, ends, start, to))
-        conductors += [wire_of(curve, order, n) for n, curve in enumerate(curves, 1)]
-    return SurveyLine(tuple(spans), tuple(conductors), ())
-
-
-def span(number: int, line: int, ends, start: int = 0, to: int = 0) -> LineSpan:
-    length = float(np.hypot(*(ends[1] - ends[0])))
-    return LineSpan(
-        tuple(ends[0]), tuple(ends[1]), number, line, number, start, to, length, 0.0, 3, 0, 0.0, ""
-    )
-
-
-def wire_of(curve: Catenary, span_id: int, number: int, kind: str = "conductor") -> Conductor:
-    facts = {"points": 0, "seen": 1.0, "rmse": 0.0, "from_height": 0.0, "to_height": 0.0}
-    return Conductor(
-        catenary=curve, tube=0.25, span_id=span_id, conductor_id=number, kind=kind,
-        subconductors=1, from_tower=0, to_tower=0, c=curve.parameter, sag=curve.sag,
-        blowout=curve.blowout, length=curve.length, from_z=curve.start[2], to_z=curve.end[2],
-        **facts,
-    )  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def corridor():
-    """A line of five poles in a wood: points (n, 3) m, their true codes, and the line."""
+    """A line of four poles in a wood: points (n, 3) m, their true codes, and the line."""
     settings = SyntheticSettings(
         towers=4, seed=7, kinds={"lattice_pole": 1.0}, density=20, section=0, margin=30.0
     )
     made = make_corridor(settings)
     parts = list(made)
     xyz = np.concatenate([part.xyz for part in parts])
-    return xyz, np.concatenate([part.truth for part in parts]), true_line(made)
+    return xyz, np.concatenate([part.truth for part in parts]), true_line(made.conductors)
 
 
 def within(xyz, codes):
@@ -223,9 +194,9 @@ def test_a_wire_of_another_line_is_an_obstacle_and_one_of_the_own_line_is_not():
     across = [np.array(below.start[:2]), np.array(below.end[:2])]
     line = SurveyLine(
         (
-            span(1, 1, ends),
-            span(2, 2, across),
-            span(3, 0, [np.array(cable.start[:2]), np.array(cable.end[:2])]),
+            span_of(1, 1, ends),
+            span_of(2, 2, across),
+            span_of(3, 0, [np.array(cable.start[:2]), np.array(cable.end[:2])]),
         ),
         (
             *(wire_of(curve, 1, n) for n, curve in enumerate(own, 1)),

@@ -9,6 +9,8 @@ from scenenet.clearance.kinds import HOUSE, NO_OBSTACLE, ON_GROUND, PLANT, surro
 from scenenet.clearance.trees import find_trees
 from scenenet.pointcloud.class_schemes import ASPRS
 
+FEW = 5
+
 TREES = np.array([[20.0, 20.0, 14.0], [27.0, 20.0, 9.0], [60.0, 40.0, 21.0]])
 """x, y and height, m."""
 
@@ -42,7 +44,7 @@ def scene() -> tuple[np.ndarray, np.ndarray]:
 
 def test_classes_say_what_points_are(scene):
     xyz, codes = scene
-    around = surroundings(xyz, codes, ASPRS)
+    around = surroundings(xyz, codes, ASPRS, FEW)
     assert len(around.xyz) == np.isin(codes, (2, 5, 6)).sum()  # without noise
     kinds = {2: ON_GROUND, 5: PLANT, 6: HOUSE}
     expected = [kinds[code] for code in codes.tolist() if code in kinds]
@@ -53,8 +55,8 @@ def test_classes_say_what_points_are(scene):
 
 def test_without_a_class_the_height_says_what_points_are(scene):
     xyz, codes = scene
-    known, unknown = (surroundings(xyz, each, ASPRS) for each in (codes, np.ones_like(codes)))
-    heights = surroundings(xyz, None, None)
+    known, unknown = (surroundings(xyz, each, ASPRS, FEW) for each in (codes, np.ones_like(codes)))
+    heights = surroundings(xyz, None, None, FEW)
     np.testing.assert_array_equal(heights.kind, unknown.kind)
     assert (heights.kind[codes == 2] == ON_GROUND).mean() > 0.99
     tall = heights.height > 1
@@ -70,7 +72,7 @@ def test_without_a_class_the_height_says_what_points_are(scene):
 def test_trees_are_found_one_by_one(scene, scheme):
     xyz, codes = scene
     kept = np.isin(codes, (2, 5, 7, 18))  # by height alone, a house is no other thing than a tree
-    around = surroundings(xyz[kept], None if scheme is None else codes[kept], scheme)
+    around = surroundings(xyz[kept], None if scheme is None else codes[kept], scheme, FEW)
     trees = find_trees(around, min_height=3.0)
     order = np.argsort(trees.feet[:, 0])
     assert len(order) == len(TREES)
@@ -81,10 +83,22 @@ def test_trees_are_found_one_by_one(scene, scheme):
 
 def test_lower_trees_than_asked_for_are_left_out(scene):
     xyz, codes = scene
-    assert len(find_trees(surroundings(xyz, codes, ASPRS), min_height=12.0).height) == 2
+    assert len(find_trees(surroundings(xyz, codes, ASPRS, FEW), min_height=12.0).height) == 2
 
 
 def test_nothing_but_noise_is_nothing():
-    around = surroundings(np.zeros((5, 3)), np.full(5, 7, np.uint8), ASPRS)
+    around = surroundings(np.zeros((5, 3)), np.full(5, 7, np.uint8), ASPRS, FEW)
     assert len(around.xyz) == 0
     assert len(find_trees(around, 3.0).height) == 0
+
+
+def test_single_points_are_lone_where_others_stand_together(scene):
+    xyz, codes = scene
+    dust = np.array([[70.0, 10.0, 134.0], [70.0, 70.0, 135.0], [70.3, 70.0, 135.0]])
+    added = np.concatenate((xyz[codes == 5], dust, xyz[codes == 2]))
+    around = surroundings(added, None, None, FEW)
+    plants = (codes == 5).sum()
+    assert around.lone[plants : plants + 3].all()
+    assert around.lone[:plants].mean() < 0.01 and not around.lone[plants + 3 :].any()
+    sparse = surroundings(np.concatenate((dust, xyz[codes == 2])), None, None, FEW)
+    assert not sparse.lone.any()

@@ -1,0 +1,216 @@
+"""The conductors and spans that are found in synthetic surveys, against the truth.
+
+    python -m scenenet.experiments.line_truth --model WIRES [--towers 24] [--seed 5] [--kinds ...]
+
+makes a survey for each kind of tower, finds its towers with the model of the package and its wires
+with WIRES, and compares every conductor with the one that hangs there. Prints a table of
+docs/method/line.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from scenenet.core.errors import InputError
+from scenenet.core.scratch import scratch_folder
+from scenenet.detection.settings import DetectionSettings
+from scenenet.detection.survey_tower import SurveyTower
+from scenenet.line.records import Conductor, SurveyLine
+from scenenet.models.packaged import packaged_model
+from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.settings import PredictSettings
+from scenenet.synthetic.corridor import Corridor
+from scenenet.synthetic.settings import Kind, SyntheticSettings
+from scenenet.synthetic.survey import make_survey
+from scenenet.synthetic.truth import TrueConductor
+
+SAME_M = 0.3
+"""m, median distance up to which a conductor is the true one."""
+
+AT_TOWER_M = 5.0
+"""m, distance up to which a tower is the true one (docs/reference/glossary.md)."""
+
+POLES: Mapping[str, Any] = {"density": 20.0}
+PYLONS: Mapping[str, Any] = {
+    "height": (22, 40), "span": 310, "span_spread": 30, "half_width": 40, "circuits": 2,
+    "earth_wires": 1, "bundle": 2, "catenary": 1600, "clearing": 6, "relief": 60, "density": 12,
+    "tower_density": 18, "flight_height": (90, 130), "high_strays": 0.02,
+}  # fmt: skip
+"""Settings of lines of poles and of pylons, as in docs/method/synthetic.md."""
+
+SETTINGS: Mapping[str, Mapping[str, Any]] = {"lattice": PYLONS, "window": PYLONS}
+"""Settings of the line by the kind of its towers; others are ``POLES``."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Found and true conductors of a line.
+
+    Attributes:
+        kind: of its towers.
+        towers: (true ones found, found, true).
+        found: true conductors between two towers that were found; of how many: ``true``.
+        false: conductors found that hang nowhere.
+        sag: (n,) m, errors of the sag of those found, between the true attachments.
+        c: (n,) relative errors of the catenary parameter.
+        attachment: (2 n,) m, distances of the found attachments from the true ones.
+        rmse: (n,) m.
+        ordered: spans between neighbouring towers, in the order of the line.
+        spans: true spans between two towers.
+    """
+
+    kind: str
+    towers: tuple[int, int, int]
+    found: int
+    true: int
+    false: int
+    sag: np.ndarray
+    c: np.ndarray
+    attachment: np.ndarray
+    rmse: np.ndarray
+    ordered: int
+    spans: int
+
+
+def compare(
+    kind: str, corridor: Corridor, towers: Sequence[SurveyTower], line: SurveyLine
+) -> Comparison:
+    """Compare what was found in a corridor with what stands there.
+
+    Conductors that leave the survey count as false if they hang nowhere, and are not asked for.
+    Cables of no line count as neither.
+    """
+    true = corridor.conductors
+    inner = [c for c in true if c.from_tower and c.to_tower]
+    held = [c for c in line.conductors if c.kind != "cable"]
+    pairs = [(t, _nearest(t, held)) for t in inner]
+    own = [(t, c) for t, c in pairs if c is not None]
+    sag, parameter, attachment = [], [], []
+    for t, c in own:
+        ends = np.array([t.catenary.start, t.catenary.end])
+        along, _ = c.catenary.along(ends)
+        sag.append(abs(c.catenary.between(*np.sort(along).tolist()).sag - t.catenary.sag))
+        parameter.append(abs(c.catenary.parameter / t.catenary.parameter - 1))
+        mine = np.array([c.catenary.start, c.catenary.end])
+        apart = np.linalg.norm(ends[:, None] - mine[None], axis=2)
+        attachment += apart.min(axis=1).tolist()
+    hanging = {id(c) for c in held for t in true if _median_distance(t, c) <= SAME_M}
+    names = _true_towers(corridor, towers)
+    order = [
+        (names.get(span.from_tower, 0), names.get(span.to_tower, 0))
+        for span in line.spans
+        if span.line and span.from_tower and span.to_tower
+    ]
+    numbers = [first + last for first, last in order if abs(first - last) == 1 and first and last]
+    steps = [abs(after - before) == 2 for before, after in pairwise(numbers)]
+    return Comparison(
+        kind=kind,
+        towers=(len(set(names.values())), len(towers), len(corridor.towers)),
+        found=len({id(c) for _, c in own}),
+        true=len(inner),
+        false=sum(id(c) not in hanging for c in held),
+        sag=np.array(sag),
+        c=np.array(parameter),
+        attachment=np.array(attachment),
+        rmse=np.array([c.rmse for _, c in own]),
+        ordered=sum(steps) + bool(numbers),
+        spans=len(corridor.towers) - 1,
+    )
+
+
+def _nearest(true: TrueConductor, found: Sequence[Conductor]) -> Conductor | None:
+    """The conductor that is the true one; None if there is none."""
+    apart = [(_median_distance(true, c), n) for n, c in enumerate(found)]
+    distance, number = min(apart, default=(np.inf, -1))
+    return found[number] if distance <= SAME_M else None
+
+
+def _median_distance(true: TrueConductor, found: Conductor) -> float:
+    """m, of the part of the true conductor along which the found one runs."""
+    places = true.catenary.at_shares(np.linspace(0, 1, 60))
+    along, _ = found.catenary.along(places)
+    beside = (along >= -1.0) & (along <= found.catenary.length + 1.0)
+    if beside.sum() < 2:
+        return np.inf
+    return float(np.median(np.hypot(*found.catenary.residuals(places[beside]))))
+
+
+def _true_towers(corridor: Corridor, towers: Sequence[SurveyTower]) -> dict[int, int]:
+    """Id of each tower that was found -> number of the true one."""
+    places = np.array([(t.x, t.y) for t in corridor.towers])
+    names = {}
+    for tower in towers:
+        apart = np.hypot(*(places - (tower.x, tower.y)).T)
+        if apart.min() <= AT_TOWER_M:
+            names[tower.id] = corridor.towers[int(np.argmin(apart))].id
+    return names
+
+
+def run(kind: str, towers: int, seed: int, wires: Path, folder: Path) -> Comparison:
+    """Make the survey of a kind of tower, predict it, and compare.
+
+    Raises:
+        InputError: the model cannot be used.
+    """
+    own = {**SETTINGS.get(kind, POLES), "kinds": {kind: 1.0}, "section": 0, "margin": 30.0}
+    settings = SyntheticSettings(**own, towers=towers, seed=seed)
+    survey = folder / f"{kind}.laz"
+    make_survey(settings, survey, progress=f"{kind}: survey made")
+    models = [packaged_model(), wires]
+    with predict_survey(survey, models, PredictSettings(), DetectionSettings()) as prediction:
+        assert prediction.line is not None
+        return compare(kind, Corridor(settings), prediction.towers, prediction.line)
+
+
+def table(comparisons: Sequence[Comparison]) -> list[str]:
+    """Lines of a Markdown table."""
+    lines = [
+        "| towers of kind | towers found, false | conductors found | false | error of sag, m: "
+        "median, 95 %, largest | of c, %: median | of attachments, m: median, 95 % | RMSE, m: "
+        "median | spans in order |",
+        "|---" * 9 + "|",
+    ]
+    for one in comparisons:
+        found, listed, true = one.towers
+        sag = np.percentile(one.sag, [50, 95, 100]) if len(one.sag) else [np.nan] * 3
+        ends = np.percentile(one.attachment, [50, 95]) if len(one.sag) else [np.nan] * 2
+        error = 100 * np.median(one.c)
+        lines.append(
+            f"| {one.kind} | {found} of {true}, {listed - found} | {one.found} of {one.true} | "
+            f"{one.false} | {sag[0]:.3f}, {sag[1]:.3f}, {sag[2]:.3f} | {error:.1f} "
+            f"| {ends[0]:.2f}, {ends[1]:.2f} | {np.median(one.rmse):.3f} | "
+            f"{one.ordered} of {one.spans} |"
+        )
+    return lines
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; its exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--model", type=Path, required=True, help="model of wires")
+    parser.add_argument("--towers", type=int, default=24, help="towers of a line (default 24)")
+    parser.add_argument("--seed", type=int, default=5, help="of the surveys (default 5)")
+    parser.add_argument("--kinds", nargs="+", choices=get_args(Kind), default=get_args(Kind))
+    chosen = parser.parse_args(arguments)
+    try:
+        with scratch_folder() as folder:
+            found = [
+                run(kind, chosen.towers, chosen.seed, chosen.model, folder) for kind in chosen.kinds
+            ]
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print("\n".join(table(found)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -10,7 +10,7 @@ import numpy as np
 from scenenet.detection.tower_ids import tower_ids
 from scenenet.line.catenary import Catenary
 from scenenet.line.graph import Chain, chains
-from scenenet.line.hung import HungWire, LineTower, TracedSpan
+from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan
 from scenenet.line.records import Conductor, LineNote, LineSpan, SurveyLine
 from scenenet.line.spans import find_spans
 from scenenet.line.wire_points import WirePoints
@@ -27,6 +27,10 @@ so long, m: telephone cables and those to houses."""
 BEYOND_M, AROUND_M = 15.0, 5.0
 """m beyond the end of a wire in the air at which it is asked whether the survey goes on, and how
 far around that place."""
+
+SAME_TOWER_M = 2 * REACH_M
+"""m, distance of places at which the same tower is expected: the wires of a missed one end at both
+sides of its crossarms, and on both sides of it."""
 
 TUBE_M, TUBE_RMSE = 0.25, 3.0
 """m from its catenary up to which points belong to a wire, at least, and in terms of its RMSE."""
@@ -65,7 +69,11 @@ def find_line(
             span_id = ids[step.number]
             own = _conductors(span, span_id, cable=cable)
             ends, expected = ("cable", []) if cable else _ends(span, seen)
-            notes += [LineNote(*place, "tower expected", 0, span_id) for place in expected]
+            notes += [
+                LineNote(*place, "tower expected", 0, span_id)
+                for place in expected
+                if not any(np.hypot(n.x - place[0], n.y - place[1]) <= SAME_TOWER_M for n in notes)
+            ]
             earth = sum(conductor.kind == "earth wire" for conductor in own)
             spans.append(
                 LineSpan(

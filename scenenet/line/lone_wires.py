@@ -29,6 +29,10 @@ the axis of the tower."""
 LINKED_M, GAP_M = 8.0, 40.0
 """m, gap in a wire that is bridged before it is known where it leads, and after."""
 
+PARALLEL = 12.0
+"""Degrees, up to which two stretches of wires that leave a tower are one span: over 20 m, wires
+that are attached 4 m apart at one end and together at the other differ by so much."""
+
 LOOKED_AT_M = 4.0
 """m from the axis of a stretch in which all points were looked at."""
 
@@ -42,7 +46,7 @@ def lone_spans(
     while True:
         frame = _straightest(points.xyz, left)
         if frame is None:
-            return found
+            return _joined(found)
         frame = _cut(frame, towers)
         rows = points.beside(frame, REACH_M, beyond=PAST_M)
         rows = rows[free[rows] & points.certain[rows]]
@@ -155,6 +159,35 @@ def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[T
         frame = SpanFrame.between(np.array(start), np.array(end))
         spans.append(TracedSpan(first, last, frame, tuple(wire for wire, _, _ in members)))
     return spans
+
+
+def _joined(spans: Sequence[TracedSpan]) -> list[TracedSpan]:
+    """The spans; those that leave a tower in one direction are one, though their wires may have
+    been found in different stretches."""
+    found: list[TracedSpan] = []
+    for span in spans:
+        for number, other in enumerate(found):
+            if _leave_together(span, other):
+                longer = max(span, other, key=lambda each: each.frame.length)
+                found[number] = replace(longer, wires=(*other.wires, *span.wires))
+                break
+        else:
+            found.append(span)
+    return found
+
+
+def _leave_together(one: TracedSpan, other: TracedSpan) -> bool:
+    """Whether two spans leave the same tower in about the same direction, and both end in the
+    air."""
+    for held, free in (("start", "end"), ("end", "start")):
+        tower = getattr(one, held)
+        if tower is None or tower is not getattr(other, held):
+            continue
+        in_the_air = getattr(one, free) is None and getattr(other, free) is None
+        turn = one.frame.direction @ other.frame.direction
+        if in_the_air and turn >= np.cos(np.radians(PARALLEL)):
+            return True
+    return False
 
 
 def _tower_at(catenary: Catenary, towers: Sequence[LineTower], *, at_end: bool) -> LineTower | None:

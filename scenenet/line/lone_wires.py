@@ -10,11 +10,12 @@ import numpy as np
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.frame import SpanFrame
-from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
+from scenenet.line.hung import REACH_M, TAUTEST_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.wire_points import WirePoints
 
 MIN_ALONE_M, MIN_HELD_M = 25.0, 15.0
-"""m, length of a wire without a tower, and of one with one, at least."""
+"""m, length of a wire without a tower, and of one with one, at least. One as long as the first
+shows its curvature: the jib of a crane is straighter than any wire."""
 
 WORST_ALONE_M = 0.08
 """m, greatest root mean square distance of its points from its catenary."""
@@ -56,6 +57,7 @@ def lone_spans(
             if wire.catenary.length >= MIN_HELD_M
             and wire.rmse <= WORST_ALONE_M
             and wire.covered >= SEEN_ALONE
+            and (wire.catenary.parameter <= TAUTEST_M or wire.catenary.length < MIN_ALONE_M)
         ]
         for wire in wires:
             left[wire.rows] = free[wire.rows] = False

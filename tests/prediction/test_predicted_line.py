@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import csv
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import laspy
 import line_pictures
 import numpy as np
 import pyogrio
+import pyproj
 import pytest
 from fixtures import scenes
 from fixtures.scenes import model_card
 
 from scenenet.detection.settings import DetectionSettings
+from scenenet.line.catenary import Catenary
 from scenenet.models.factory import new_model
 from scenenet.models.model_file import write_model
+from scenenet.pointcloud import PointCloud, write_las
 from scenenet.pointcloud.targets import Target
 from scenenet.prediction.line_lists import AS_FLOWN
 from scenenet.prediction.result_files import PredictionFiles
@@ -25,6 +29,7 @@ from scenenet.prediction.writers import predict_to_files
 from scenenet.training.presets import preset
 
 WIRE_Z = 13.8
+POLES_X = (30.5, 75.5, 130.5)
 LONE_POLES = DetectionSettings(min_conductor=0)
 
 
@@ -38,6 +43,24 @@ def wire_finder(tmp_path_factory) -> Path:
     found.set_numbers(numbers)
     card = model_card(name="wires", target="wire", voxel_size=0.5, tau=0.2)
     write_model(path, found, card)
+    return path
+
+
+@pytest.fixture(scope="module")
+def line(scene, tmp_path_factory) -> Path:
+    """Three poles in a row, and a wire to the second one that ends before the third."""
+    poles = [(x, 15.5) for x in POLES_X]
+    cloud = scene(poles, size=(150.0, 31.0), tree=(100.0, 20.0))
+    x = np.arange(3.0, 103.0, 0.2)
+    z = np.empty_like(x)
+    for start, end in pairwise((POLES_X[0] - 45.0, *POLES_X)):
+        wire = Catenary((start, 15.5, WIRE_Z), (end, 15.5, WIRE_Z), 900.0)
+        own = (x >= start) & (x <= end)
+        z[own] = wire.height(x[own] - start)
+    places = np.column_stack([x, np.full(len(x), 15.5), z]) + scenes.PLACE
+    codes = np.append(cloud.classification, np.full(len(x), 16, np.uint8))
+    path = tmp_path_factory.mktemp("hung") / "line.laz"
+    write_las(path, PointCloud(np.concatenate([cloud.xyz, places]), codes, crs=pyproj.CRS(32629)))
     return path
 
 
@@ -66,8 +89,11 @@ def test_the_conductor_is_traced_from_pole_to_pole_and_beyond(predicted):
     assert len(conductors) == 3
     for row in conductors:
         assert row["kind"] == "conductor"
-        assert float(row["from_z"]) == pytest.approx(scenes.PLACE[2] + WIRE_Z, abs=0.1)
-        assert float(row["sag"]) == pytest.approx(0.0, abs=0.1)
+        for tower, z in (("from_tower", "from_z"), ("to_tower", "to_z")):
+            if row[tower] != "0":
+                assert float(row[z]) == pytest.approx(scenes.PLACE[2] + WIRE_Z, abs=0.15)
+    between = next(row for row in conductors if row["span_id"] == held[0]["span_id"])
+    assert float(between["sag"]) == pytest.approx(45**2 / (8 * 900), abs=0.05)
 
 
 def test_each_point_of_the_wire_has_its_span_and_no_other_point_has_one(predicted, line):
@@ -109,7 +135,8 @@ def test_the_picture_draws_each_conductor_over_the_points(predicted):
     wires = [drawn for drawn in profile.lines if drawn.get_linewidth() == line_pictures.WIRE_WIDTH]
     assert len(wires) == own
     heights = np.concatenate([drawn.get_ydata() for drawn in wires])
-    np.testing.assert_allclose(heights, scenes.PLACE[2] + WIRE_Z, atol=0.15)
+    deepest = 55**2 / (8 * 900)
+    assert (np.abs(heights + deepest / 2 - scenes.PLACE[2] - WIRE_Z) < deepest / 2 + 0.1).all()
 
 
 def test_towers_alone_leave_no_outdated_line(predicted, line, model):

@@ -41,6 +41,34 @@ def line_notes() -> str:
     return _table("column", ((c.name, c.unit, c.description) for c in NOTE_COLUMNS))
 
 
+def clearances() -> str:
+    """Every column of the list of clearances."""
+    from scenenet.clearance.records import CLEARANCE_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in CLEARANCE_COLUMNS))
+
+
+def span_clearances() -> str:
+    """Every column of the table of clearances by span."""
+    from scenenet.clearance.records import SPAN_CLEARANCE_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in SPAN_CLEARANCE_COLUMNS))
+
+
+def clearance_profile() -> str:
+    """Every column of the steps along spans."""
+    from scenenet.clearance.records import PROFILE_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in PROFILE_COLUMNS))
+
+
+def fall_trees() -> str:
+    """Every column of the list of trees that could fall."""
+    from scenenet.clearance.records import TREE_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in TREE_COLUMNS))
+
+
 def class_schemes() -> str:
     """Every class scheme."""
     from scenenet.pointcloud.class_schemes import markdown
@@ -85,6 +113,10 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "spans": spans,
     "conductors": conductors,
     "line notes": line_notes,
+    "clearances by span": span_clearances,
+    "clearances": clearances,
+    "fall trees": fall_trees,
+    "clearance profile": clearance_profile,
 }
 """What stands in the first comment -> the table."""
 

@@ -130,15 +130,14 @@ class _Finder:
         own = [place for place in places if place.span_id == span.span_id]
         dangers = [place for place in own if place.what == "danger"]
         falling = [tree for tree in trees if tree.span_id == span.span_id]
-        ranked = [place for place in own if place.margin is not None or self._limits is None]
         by_kind = {
             kind: min((place.distance for place in own if place.kind == kind), default=None)
             for kind in KINDS
         }
         return SpanClearance(
             span_id=span.span_id, line=span.line, order=span.order, from_tower=span.from_tower,
-            to_tower=span.to_tower, worst_kind=ranked[0].kind if ranked else "",
-            worst_margin=ranked[0].margin if ranked else None, **by_kind,
+            to_tower=span.to_tower, worst_kind=own[0].kind if own else "",
+            worst_margin=own[0].margin if own else None, **by_kind,
             dangers=len(dangers), few_points=sum(bool(place.note) for place in dangers),
             danger_points=sum(place.points for place in dangers), fall_trees=len(falling),
             fall_margin=min((tree.margin for tree in falling), default=None),
@@ -180,9 +179,7 @@ class _Finder:
         wire = point.conductor
         on = wire.catenary.at(np.array([point.along]))[0]
         x, y, z = point.xyz.tolist()
-        limit = None
-        if self._limits is not None and wire.kind == "conductor":
-            limit = self._limits.of(point.kind)
+        limit = None if self._limits is None else self._limits.of(point.kind)
         few = what == "danger" and point.kind != WIRE and points < self._settings.few_points
         return Clearance(
             span_id=wire.span_id, conductor_id=wire.conductor_id, conductor_kind=wire.kind,
@@ -223,12 +220,13 @@ class _Finder:
     def _step(
         self, frame: SpanFrame, span: LineSpan, number: int, kind: str, point: NearPoint
     ) -> ProfileStep:
-        along, _, z = frame.to_frame(point.xyz[None])[0].tolist()
+        along = float(frame.to_frame(point.xyz[None])[0, 0])
+        x, y, z = point.xyz.tolist()
         on = point.conductor.catenary.at(np.array([point.along]))[0]
         return ProfileStep(
             span_id=span.span_id, start=number * self._settings.step, kind=kind,
-            distance=point.distance, conductor_id=point.conductor.conductor_id, along=along, z=z,
-            wire_z=float(on[2]),
+            distance=point.distance, conductor_id=point.conductor.conductor_id, along=along,
+            x=x, y=y, z=z, wire_z=float(on[2]),
         )  # fmt: skip
 
 

@@ -92,9 +92,11 @@ def near_points(
         step: (n,) number of the step along the span.
         lone: (n,) bool, which points are lone ones.
         conductors: of the span.
-        limits: for the voltage; earth wires have none. None without a voltage.
+        limits: for the voltage, also of earth wires, because a conductor may be taken for one. None
+            without a voltage.
     """
     limit_of = np.array([limits.of(name) if limits else 0.0 for name in POINT_KINDS])
+    limit = limit_of[kind]
     cell = step * len(POINT_KINDS) + kind
     nearest: list[NearPoint] = []
     steps: dict[int, NearPoint] = {}
@@ -103,7 +105,6 @@ def near_points(
         lower, upper = bounds(conductor.catenary, xyz)
         best = np.full(int(cell.max(initial=0)) + 1, np.inf)
         np.minimum.at(best, cell[~lone], upper[~lone])
-        limit = limit_of[kind] * (conductor.kind == "conductor")
         rows = np.flatnonzero((~lone & (lower <= best[cell])) | (lower < limit))
         exact = nearest_on(conductor.catenary, xyz[rows])
         # Sorted by distance, the first row of a group is its nearest point.

@@ -127,6 +127,8 @@ class ProfileStep(_Record):
     distance: float = column("m", "smallest distance in space from a conductor of the span")
     conductor_id: int = column("", "number of this conductor")
     along: float = column("m", "along the span, of the point")
+    x: float = column("m", "easting of the point")
+    y: float = column("m", "northing of the point")
     z: float = column("m", "elevation of the point", vertical=True)
     wire_z: float = column("m", "elevation of the nearest place on the conductor", vertical=True)
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from scenenet.clearance.records import (
     CLEARANCE_COLUMNS,
+    PROFILE_COLUMNS,
     SPAN_CLEARANCE_COLUMNS,
     TREE_COLUMNS,
     SurveyClearances,
@@ -38,9 +39,11 @@ def write_clearance_layers(
     crs: pyproj.CRS | None,
     sizes: tuple[float, float, float],
 ) -> list[str]:
-    """Add the layers ``clearances`` (LineStringZ, from the conductor to what is near) and
-    ``fall_trees`` (PointZ, the foot of the tree) to a GeoPackage, the worst first; returns their
-    names.
+    """Add layers to a GeoPackage; returns their names.
+
+    They are ``clearances`` (LineStringZ, from the conductor to what is near) and ``fall_trees``
+    (PointZ, the foot of the tree), the worst first, and ``clearance_profile`` (PointZ, what is
+    nearest in a step along a span), span by span.
 
     Args:
         sizes: as ``write_clearances_csv``.
@@ -54,9 +57,11 @@ def write_clearance_layers(
         for p in clearances.places
     ]
     feet = [shapely.Point(np.array([t.x, t.y, t.ground]) / scale) for t in clearances.trees]
+    steps = [shapely.Point(np.array([s.x, s.y, s.z]) / scale) for s in clearances.profile]
     layers: list[tuple[str, str, list[Any], Sequence[Any], Sequence[FieldColumn]]] = [
         ("clearances", "LineString Z", apart, clearances.places, CLEARANCE_COLUMNS),
         ("fall_trees", "Point Z", feet, clearances.trees, TREE_COLUMNS),
+        ("clearance_profile", "Point Z", steps, clearances.profile, PROFILE_COLUMNS),
     ]
     for name, kind, geometry, rows, columns in layers:
         write_rows(path, name, kind, geometry, rows, columns, crs, sizes)

@@ -58,6 +58,14 @@ STYLES: Mapping[str, str] = {
         line_color="214,39,40,255",
         line_width="0.4",
     ),
+    "clearance_profile": _style(
+        "marker",
+        "SimpleMarker",
+        name="circle",
+        color="120,120,120,255",
+        outline_color="120,120,120,255",
+        size="0.8",
+    ),
     "fall_trees": _style(
         "marker",
         "SimpleMarker",

@@ -8,6 +8,12 @@ import pandas as pd
 import pytest
 from fixtures.output_reference import Described, described
 
+from scenenet.clearance.records import (
+    CLEARANCE_COLUMNS,
+    PROFILE_COLUMNS,
+    SPAN_CLEARANCE_COLUMNS,
+    TREE_COLUMNS,
+)
 from scenenet.experiments.components import run as components
 from scenenet.experiments.components.summary import summarise_components
 from scenenet.experiments.cross_validation.run import COLUMNS
@@ -54,6 +60,10 @@ def test_runs_and_table_of_the_parts_of_the_method_are_described(page):
         ("SURVEY.spans.csv", SPAN_COLUMNS),
         ("SURVEY.conductors.csv", CONDUCTOR_COLUMNS),
         ("SURVEY.gpkg, layer line_notes", NOTE_COLUMNS),
+        ("SURVEY.clearances.csv", SPAN_CLEARANCE_COLUMNS),
+        ("SURVEY.gpkg, layer clearances", CLEARANCE_COLUMNS),
+        ("SURVEY.gpkg, layer fall_trees", TREE_COLUMNS),
+        ("SURVEY.gpkg, layer clearance_profile", PROFILE_COLUMNS),
     ],
 )
 def test_the_tables_of_a_line_are_described(page, heading, columns):

@@ -124,7 +124,9 @@ def test_the_table_has_a_row_for_each_span_the_worst_first(found, survey, tmp_pa
 
 def test_layers_join_wires_and_what_is_near(found, tmp_path):
     path = tmp_path / "line.gpkg"
-    assert write_clearance_layers(path, found, None, (1, 1, 1)) == ["clearances", "fall_trees"]
+    assert write_clearance_layers(path, found, None, (1, 1, 1)) == [
+        "clearances", "fall_trees", "clearance_profile"
+    ]  # fmt: skip
     places = features(path, "clearances")
     assert len(places) == len(found.places) > len(found.dangers) > 0
     for (line, distance, limit, kinds), place in zip(places, found.places, strict=True):
@@ -134,7 +136,9 @@ def test_layers_join_wires_and_what_is_near(found, tmp_path):
         assert limit == place.limit and kinds == found.kinds
     with sqlite3.connect(path) as database:
         trees = database.execute("SELECT height, margin FROM fall_trees").fetchall()
+        steps = database.execute("SELECT start, distance FROM clearance_profile").fetchall()
     assert trees == [(tree.height, tree.margin) for tree in found.trees]
+    assert steps == [(step.start, step.distance) for step in found.profile]
 
 
 def test_layers_without_a_voltage_have_no_limits(survey, wires, tmp_path):

@@ -137,7 +137,8 @@ def command(
 
     NAME.clearances.csv: with these models, a row per span, the worst first: how near ground,
     vegetation, buildings and other wires are to its conductors, and with --voltage how many places
-    are closer than the limits. NAME.gpkg then has the layers clearances and fall_trees.
+    are closer than the limits. NAME.gpkg then has the layers clearances,
+    clearance_profile and fall_trees.
 
     NAME.html: a page with a map, the list of the towers, and each tower in plan and profile with
     its reasons and what to check. It needs no other file and no network.

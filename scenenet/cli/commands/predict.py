@@ -177,6 +177,11 @@ def command(
         used = use_models(model, settings, scheme)
         _require_codes(used, settings, scheme)
         towers, line = used[0].target.is_tower, finds_lines(used)
+    if voltage is not None and named and not line:
+        raise typer.BadParameter(
+            "needs a model of towers and one of target wire (--model, twice)",
+            param_hint="--voltage",
+        )
     files = {
         given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=line)
         for given, survey in named.items()

@@ -11,7 +11,14 @@ from scenenet.detection.tower_ids import tower_ids
 from scenenet.line.catenary import Catenary
 from scenenet.line.graph import Chain, chains
 from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan
-from scenenet.line.records import Conductor, LineNote, LineSpan, SurveyLine
+from scenenet.line.records import (
+    EXPECTED,
+    UNHELD,
+    Conductor,
+    LineNote,
+    LineSpan,
+    SurveyLine,
+)
 from scenenet.line.spans import find_spans
 from scenenet.line.wire_points import WirePoints
 
@@ -70,7 +77,7 @@ def find_line(
             own = _conductors(span, span_id, cable=cable)
             ends, expected = ("cable", []) if cable else _ends(span, seen)
             notes += [
-                LineNote(*place, "tower expected", 0, span_id)
+                LineNote(*place, EXPECTED, 0, span_id)
                 for place in expected
                 if not any(np.hypot(n.x - place[0], n.y - place[1]) <= SAME_TOWER_M for n in notes)
             ]
@@ -88,9 +95,7 @@ def find_line(
             conductors += own
     held = {span.from_tower for span in spans} | {span.to_tower for span in spans}
     notes += [
-        LineNote(tower.x, tower.y, "tower without a conductor", tower.id, 0)
-        for tower in towers
-        if tower.id not in held
+        LineNote(tower.x, tower.y, UNHELD, tower.id, 0) for tower in towers if tower.id not in held
     ]
     return SurveyLine(tuple(spans), tuple(conductors), tuple(notes))
 
@@ -198,7 +203,7 @@ def _ends(span: TracedSpan, seen: Seen) -> tuple[str, list[tuple[float, float]]]
         else:
             leaves = True
     if expected:
-        return "tower expected", expected
+        return EXPECTED, expected
     return ("leaves the survey" if leaves else "between towers"), []
 
 

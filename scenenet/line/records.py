@@ -137,6 +137,9 @@ class LineNote:
         return {c.name: c.value(self) for c in NOTE_COLUMNS}
 
 
+EXPECTED, UNHELD = "tower expected", "tower without a conductor"
+"""What the line says of a place."""
+
 CONDUCTOR_COLUMNS = columns_of(Conductor)
 """Every column of the list of conductors, in order."""
 

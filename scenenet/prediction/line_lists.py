@@ -21,6 +21,9 @@ from scenenet.prediction.tower_lists import arrays, write_layer
 if TYPE_CHECKING:
     import pyproj
 
+NOTES = "line_notes"
+"""Name of the layer with the places to look at."""
+
 DRAWN_M = 5.0
 """m, steps along a conductor at which a layer has its vertices. The chord of a wire with c = 300 m
 is 1 cm above it there."""
@@ -68,7 +71,7 @@ def write_line_layers(
     layers: list[tuple[str, str, list[Any], Sequence[Any], Sequence[FieldColumn]]] = [
         ("spans", "LineString", spans, line.spans, SPAN_COLUMNS),
         ("conductors", "LineString Z", wires, line.conductors, CONDUCTOR_COLUMNS),
-        ("line_notes", "Point", places, line.notes, NOTE_COLUMNS),
+        (NOTES, "Point", places, line.notes, NOTE_COLUMNS),
     ]
     for name, kind, geometry, rows, columns in layers:
         write_rows(path, name, kind, geometry, rows, columns, crs, sizes)

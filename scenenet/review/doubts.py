@@ -10,6 +10,7 @@ import numpy as np
 from scenenet.core.errors import InputError
 from scenenet.detection.survey_tower import CONTRIBUTION, TOWER_COLUMNS, SurveyTower
 from scenenet.interpretability.explanations import doubts
+from scenenet.line.records import UNHELD
 from scenenet.pointcloud.units import SYMBOLS
 from scenenet.review.found_list import FoundList, ListedTower
 
@@ -51,7 +52,8 @@ def by_doubt(found: FoundList) -> list[Doubted]:
     """
     towers = [_survey_tower(tower, found) for tower in found.towers]
     own = [list(doubts(t, found.tau, found.unit_sizes, found.unit_names)) for t in towers]
-    for more in (_unusual_heights(towers, found), _neighbours(towers, found)):
+    others = (_unusual_heights(towers, found), _neighbours(towers, found), _without_line(found))
+    for more in others:
         for reasons, reason in zip(own, more, strict=True):
             reasons += reason
     doubted = [Doubted(t, tuple(r)) for t, r in zip(found.towers, own, strict=True)]
@@ -97,6 +99,13 @@ def _unusual_heights(towers: list[SurveyTower], found: FoundList) -> list[list[s
         else []
         for height in heights
     ]
+
+
+def _without_line(found: FoundList) -> list[list[str]]:
+    """A reason for each tower that no conductor leads to."""
+    unheld = {note.tower for note in found.notes if note.what == UNHELD}
+    reason = "no conductor that was traced leads to it"
+    return [[reason] if tower.id in unheld else [] for tower in found.towers]
 
 
 def _neighbours(towers: list[SurveyTower], found: FoundList) -> list[list[str]]:

@@ -12,6 +12,8 @@ import numpy as np
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 from scenenet.detection.survey_tower import CONTRIBUTION, row_types
+from scenenet.line.records import LineNote
+from scenenet.prediction.line_lists import NOTES
 from scenenet.prediction.summary import SUMMARY
 from scenenet.review.tables.layer import layers_of
 from scenenet.review.tables.table import Row, Table, read_table
@@ -60,6 +62,8 @@ class FoundList:
         tau: of the model; None if it is not known.
         voxel_size: m, of the prediction; None if it is not known.
         classified: whether the prediction gave towers a class code.
+        notes: places that the line between the towers says something of, in the units of the
+            survey; none where no line was looked for.
     """
 
     path: Path
@@ -73,6 +77,7 @@ class FoundList:
     tau: float | None = None
     voxel_size: float | None = None
     classified: bool = False
+    notes: tuple[LineNote, ...] = ()
 
     @property
     def places(self) -> np.ndarray:
@@ -114,7 +119,7 @@ def find_list(given: str | Path) -> FoundList:
     facts = _summary(path.with_name(name + SUMMARY))
     return FoundList(
         path, name, columns, towers, crs=table.crs or crs or _crs(facts.get("crs")),
-        coverage=coverage, **_of_summary(facts),
+        coverage=coverage, notes=_notes(covered), **_of_summary(facts),
     )  # fmt: skip
 
 
@@ -199,6 +204,17 @@ def _coverage(package: Path) -> tuple[Any, pyproj.CRS | None]:
     crs = None if facts["crs"] is None else pyproj.CRS(facts["crs"])
     # An empty layer has no polygon, and an empty survey covers nothing.
     return shapely.union_all(shapely.from_wkb(geometry)), crs
+
+
+def _notes(package: Path) -> tuple[LineNote, ...]:
+    """The rows of the layer with the places to look at along the line; none without a line."""
+    import pyogrio
+
+    if NOTES not in _layers(package):
+        return ()
+    facts, _, _, values = pyogrio.raw.read(package, layer=NOTES, read_geometry=False)
+    rows = zip(*(column.tolist() for column in values), strict=True)
+    return tuple(LineNote(**dict(zip(facts["fields"], row, strict=True))) for row in rows)
 
 
 def _summary(path: Path) -> Mapping[str, Any]:

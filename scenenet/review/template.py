@@ -1,4 +1,5 @@
-"""A review file to fill in: every tower of a list, the doubtful ones first."""
+"""A review file to fill in: the places where the line expects a tower, then every tower of a list,
+the doubtful ones first."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from typing import Any
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic
+from scenenet.line.records import EXPECTED, LineNote
 from scenenet.prediction.tower_lists import arrays, write_layer
 from scenenet.review.decisions import LAYER
 from scenenet.review.doubts import Doubted, by_doubt
@@ -38,7 +40,7 @@ def write_template(path: Path, found: FoundList) -> list[Doubted]:
     if path.suffix.lower() not in (".csv", ".gpkg"):
         raise InputError("a review file is a .csv or .gpkg file", file=path)
     doubted = by_doubt(found)
-    rows = [_row(each) for each in doubted]
+    rows = [*map(_expected, expected(found)), *map(_row, doubted)]
     with atomic(path) as partial:
         if path.suffix.lower() == ".csv":
             with partial.open("w", encoding="utf-8", newline="") as stream:
@@ -47,9 +49,20 @@ def write_template(path: Path, found: FoundList) -> list[Doubted]:
                 table.writerows(rows)
         else:
             values = {column: [row[column] for row in rows] for column in COLUMNS}
-            points = [shapely.Point(each.tower.x, each.tower.y) for each in doubted]
+            points = [shapely.Point(row["x"], row["y"]) for row in rows]
             write_layer(partial, LAYER, "Point", points, arrays(values, COLUMNS), found.crs)
     return doubted
+
+
+def expected(found: FoundList) -> list[LineNote]:
+    """The places where the line between the towers expects one more."""
+    return [note for note in found.notes if note.what == EXPECTED]
+
+
+def _expected(note: LineNote) -> dict[str, Any]:
+    """A row without an id; a person who sees a tower there writes ``add``."""
+    why = "conductors end here: a tower is expected"
+    return {**dict.fromkeys(COLUMNS), "doubts": why, "x": note.x, "y": note.y}
 
 
 def _row(doubted: Doubted) -> dict[str, Any]:

@@ -31,6 +31,10 @@ CABLE_WIRES, CABLE_M = 2, 60.0
 """Wires without any tower are cables of no line if there are at most so many and they are at most
 so long, m: telephone cables and those to houses."""
 
+SLACK = 0.5
+"""Share of the usual catenary parameter of a line below which a wire is a cable that ends at or
+passes a tower: telephone cables hang slacker than conductors."""
+
 BEYOND_M, AROUND_M = 15.0, 5.0
 """m beyond the end of a wire in the air at which it is asked whether the survey goes on, and how
 far around that place."""
@@ -71,24 +75,26 @@ def find_line(
     for chain in lines:
         cable = _is_cable([traced[step.number] for step in chain.steps])
         number += not cable
+        slack = SLACK * _usual_parameter([traced[step.number] for step in chain.steps])
         for order, (step, angle) in enumerate(zip(chain.steps, chain.angles, strict=True), 1):
             span = _run_through(traced, chain, order - 1)
             span_id = ids[step.number]
-            own = _conductors(span, span_id, cable=cable)
+            own = _conductors(span, span_id, slack=np.inf if cable else slack)
             ends, expected = ("cable", []) if cable else _ends(span, seen)
             notes += [
                 LineNote(*place, EXPECTED, 0, span_id)
                 for place in expected
                 if not any(np.hypot(n.x - place[0], n.y - place[1]) <= SAME_TOWER_M for n in notes)
             ]
-            earth = sum(conductor.kind == "earth wire" for conductor in own)
+            kinds = [conductor.kind for conductor in own]
             spans.append(
                 LineSpan(
                     start=_place(span, 0), end=_place(span, 1), span_id=span_id,
                     line=0 if cable else number, order=order,
                     from_tower=_id(span.start), to_tower=_id(span.end),
                     length=span.frame.length, angle=angle,
-                    conductors=len(own) - earth, earth_wires=earth,
+                    conductors=len(own) if cable else kinds.count("conductor"),
+                    earth_wires=kinds.count("earth wire"),
                     worst_rmse=max(conductor.rmse for conductor in own), ends=ends,
                 )
             )  # fmt: skip
@@ -107,6 +113,11 @@ def _is_cable(spans: Sequence[TracedSpan]) -> bool:
         and span.frame.length <= CABLE_M
         for span in spans
     )  # fmt: skip
+
+
+def _usual_parameter(spans: Sequence[TracedSpan]) -> float:
+    """m, median catenary parameter of the wires of a line."""
+    return float(np.median([wire.catenary.parameter for span in spans for wire in span.wires]))
 
 
 def _run_through(spans: Sequence[TracedSpan], chain: Chain, index: int) -> TracedSpan:
@@ -146,8 +157,9 @@ def _turned(span: TracedSpan) -> TracedSpan:
     return TracedSpan(span.end, span.start, other, tuple(wires))
 
 
-def _conductors(span: TracedSpan, span_id: int, *, cable: bool) -> list[Conductor]:
-    """The conductors of a span, numbered from left to right and from the top."""
+def _conductors(span: TracedSpan, span_id: int, slack: float) -> list[Conductor]:
+    """The conductors of a span, numbered from left to right and from the top. Wires with a
+    parameter below ``slack`` m are cables."""
 
     def place(wire: HungWire) -> tuple[float, float]:
         middle = wire.catenary.at_shares(np.array([0.5]))
@@ -155,11 +167,14 @@ def _conductors(span: TracedSpan, span_id: int, *, cable: bool) -> list[Conducto
         return -round(left, 1), -z
 
     wires = sorted(span.wires, key=place)
-    earth = set() if cable else _earth_wires(wires)
+    own = [wire for wire in wires if wire.catenary.parameter >= slack]
+    earth = {id(own[number]) for number in _earth_wires(own)}
     found = []
     for number, wire in enumerate(wires):
         curve = wire.catenary
-        kind = "cable" if cable else "earth wire" if number in earth else "conductor"
+        kind = "earth wire" if id(wire) in earth else "conductor"
+        if curve.parameter < slack:
+            kind = "cable"
         tube = max(TUBE_M, TUBE_RMSE * wire.rmse) + (BUNDLE_M if wire.subconductors > 1 else 0.0)
         heights = (
             0.0 if tower is None else z - tower.base

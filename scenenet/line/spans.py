@@ -25,6 +25,10 @@ FOLLOWED = 0.4
 BETWEEN_M = 6.0
 """m, distance from the axis of a span up to which a tower divides it."""
 
+BEHIND = 8.0
+"""Degrees from the direction of a span in which no longer span leaves the same tower: what is there
+is behind the next one."""
+
 UNSEEN_M, UNSEEN_SHARE = 40.0, 0.35
 """m, and share of a span, that may be hidden between the first point of a wire and its tower; the
 greater of both."""
@@ -39,10 +43,14 @@ def find_spans(
         progress: label of the progress on stderr; None shows no progress.
     """
     free = np.ones(len(points), bool)
-    found = []
+    found: list[TracedSpan] = []
     pairs = list(_pairs(points, towers))
     for first, last in pairs if progress is None else track(pairs, progress):
         frame = SpanFrame.between(first.place, last.place)
+        if _leads_elsewhere(found, first, frame.direction) or _leads_elsewhere(
+            found, last, -frame.direction
+        ):
+            continue
         rows = points.beside(frame, REACH_M)
         wires = tuple(_between(traced(points, rows[free[rows]], frame), frame, first, last))
         if wires:
@@ -50,6 +58,15 @@ def find_spans(
                 free[wire.rows] = False
             found.append(TracedSpan(first, last, frame, wires))
     return found + lone_spans(points, free, towers)
+
+
+def _leads_elsewhere(found: Sequence[TracedSpan], tower: LineTower, way: np.ndarray) -> bool:
+    """Whether a span, and so a shorter one, leaves a tower in a direction (2,) already."""
+    for span in found:
+        for end, sign in ((span.start, 1.0), (span.end, -1.0)):
+            if end is tower and sign * span.frame.direction @ way >= np.cos(np.radians(BEHIND)):
+                return True
+    return False
 
 
 def _pairs(

@@ -35,6 +35,10 @@ SLACK = 0.5
 """Share of the usual catenary parameter of a line below which a wire is a cable that ends at or
 passes a tower: telephone cables hang slacker than conductors."""
 
+OWN_SPANS = 3
+"""Spans from which a line shows its own usual parameter; that of a shorter one is that of the
+survey."""
+
 BEYOND_M, AROUND_M = 15.0, 5.0
 """m beyond the end of a wire in the air at which it is asked whether the survey goes on, and how
 far around that place."""
@@ -73,9 +77,10 @@ def find_line(
     notes: list[LineNote] = []
     number = 0
     for chain in lines:
-        cable = _is_cable([traced[step.number] for step in chain.steps])
+        own_spans = [traced[step.number] for step in chain.steps]
+        slack = SLACK * _usual_parameter(own_spans if len(own_spans) >= OWN_SPANS else traced)
+        cable = _is_cable(own_spans, slack)
         number += not cable
-        slack = SLACK * _usual_parameter([traced[step.number] for step in chain.steps])
         for order, (step, angle) in enumerate(zip(chain.steps, chain.angles, strict=True), 1):
             span = _run_through(traced, chain, order - 1)
             span_id = ids[step.number]
@@ -99,20 +104,22 @@ def find_line(
                 )
             )  # fmt: skip
             conductors += own
-    held = {span.from_tower for span in spans} | {span.to_tower for span in spans}
+    held = {end for span in spans if span.line for end in (span.from_tower, span.to_tower)}
     notes += [
         LineNote(tower.x, tower.y, UNHELD, tower.id, 0) for tower in towers if tower.id not in held
     ]
     return SurveyLine(tuple(spans), tuple(conductors), tuple(notes))
 
 
-def _is_cable(spans: Sequence[TracedSpan]) -> bool:
-    """Whether wires are those of no line."""
-    return all(
+def _is_cable(spans: Sequence[TracedSpan], slack: float) -> bool:
+    """Whether wires are those of no line: few and short ones that no tower holds, or all of them
+    slack."""
+    loose = all(
         span.start is None and span.end is None and len(span.wires) <= CABLE_WIRES
         and span.frame.length <= CABLE_M
         for span in spans
     )  # fmt: skip
+    return loose or all(wire.catenary.parameter < slack for span in spans for wire in span.wires)
 
 
 def _usual_parameter(spans: Sequence[TracedSpan]) -> float:

@@ -7,11 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from fixtures.line_scene import KnownLine
+from fixtures.line_scene import KnownLine, points_on
 
+from scenenet.line.catenary import Catenary
 from scenenet.line.find_line import find_line
 from scenenet.line.hung import LineTower
 from scenenet.line.records import SurveyLine
+from scenenet.line.wire_points import WirePoints
 
 
 def errors(line: SurveyLine, known: KnownLine) -> np.ndarray:
@@ -104,6 +106,21 @@ def test_a_tower_beside_the_line_has_no_conductor(pylons):
     false = LineTower(99, first.x + 60.0, first.y + 60.0, first.base, 20.0)
     line = find_line(pylons.points, [*pylons.towers, false], pylons.to_its_ends)
     assert [(n.what, n.tower) for n in line.notes] == [("tower without a conductor", 99)]
+
+
+def test_a_slack_cable_at_a_tower_is_no_conductor(poles):
+    tower = poles.towers[2]
+    start = np.array([tower.x, tower.y, tower.base + 7.0])
+    way = poles.inner[6].catenary.direction[::-1] * (-1, 1)
+    cable = Catenary.of(start, start + np.append(40.0 * way, 0.0), 230.0)
+    points = points_on(cable, 0.3, np.random.default_rng(1))
+    xyz = np.concatenate([poles.xyz, points])
+    line = find_line(WirePoints(xyz, np.ones(len(xyz), bool)), poles.towers, poles.everywhere)
+    [found] = [c for c in line.conductors if c.kind == "cable"]
+    assert found.c == pytest.approx(230.0, rel=0.1)
+    assert {span.ends for span in line.spans if span.span_id == found.span_id} == {"cable"}
+    assert found.span_id not in {note.span_id for note in line.notes}
+    assert errors(line, poles)[:, 0].max() < 0.05
 
 
 def test_points_that_are_not_certain_help_beside_those_that_are(poles):

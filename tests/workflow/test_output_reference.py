@@ -17,10 +17,10 @@ pytestmark = pytest.mark.workflow
 
 ONLY_ELSEWHERE = {
     "sample", "samples", "search", "metric", "evidence", "target", "first", "span_id",
-    "conductor_id",
+    "conductor_id", "measurement_source",
 }  # fmt: skip
 """Names of results that this run does not have: those of TS40K folders, of models in metres, of
-other targets and of lines."""
+other targets, of lines and of measurements from outside the package."""
 FREE_KEYS = ("mlflow/NAME.json", "config.yaml")
 """Files whose keys are names that the user chose."""
 

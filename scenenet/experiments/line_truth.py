@@ -3,8 +3,7 @@
     python -m scenenet.experiments.line_truth --model WIRES [--towers 24] [--seed 5] [--kinds ...]
 
 makes a survey for each kind of tower, finds its towers with the model of the package and its wires
-with WIRES, and compares every conductor with the one that hangs there. Prints a table of
-docs/method/line.md.
+with WIRES, and compares every conductor with the one that hangs there. Prints a Markdown table.
 """
 
 from __future__ import annotations

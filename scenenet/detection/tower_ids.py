@@ -1,7 +1,8 @@
 """Ids of towers, which follow from where the towers stand.
 
 A tower keeps its id when its survey is cut elsewhere, when tiles are added, and when its tile is
-predicted alone. A number in the order of a list would change with each of these.
+predicted alone. A number in the order of a list would change with each of these. Spans are numbered
+in the same way, by their middles.
 """
 
 from __future__ import annotations

@@ -181,11 +181,11 @@ def table(comparisons: Sequence[Comparison]) -> list[str]:
         found, listed, true = one.towers
         sag = np.percentile(one.sag, [50, 95, 100]) if len(one.sag) else [np.nan] * 3
         ends = np.percentile(one.attachment, [50, 95]) if len(one.sag) else [np.nan] * 2
-        error = 100 * np.median(one.c)
+        error, rmse = (np.median(each) if len(each) else np.nan for each in (100 * one.c, one.rmse))
         lines.append(
             f"| {one.kind} | {found} of {true}, {listed - found} | {one.found} of {one.true} | "
             f"{one.false} | {sag[0]:.3f}, {sag[1]:.3f}, {sag[2]:.3f} | {error:.1f} "
-            f"| {ends[0]:.2f}, {ends[1]:.2f} | {np.median(one.rmse):.3f} | "
+            f"| {ends[0]:.2f}, {ends[1]:.2f} | {rmse:.3f} | "
             f"{one.ordered} of {one.spans} |"
         )
     return lines

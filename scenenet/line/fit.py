@@ -103,17 +103,14 @@ def fit_catenary(
             (low, float(beside[0]), float(first)), (high, float(beside[1]), float(last)),
             1 / curvature, float(beside[2]),
         )  # fmt: skip
-        right, above = catenary.residuals(stz)
-        distance = np.hypot(right, above)
+        distance = np.hypot(*catenary.residuals(stz))
         spread = max(NOISE_M, float(np.median(distance[used])) / RAYLEIGH_MEDIAN)
         # From wide to narrow: the first fits are those of all points, outliers too.
         scale = min(TUKEY * spread, width * 2.0 ** max(WIDE - number, 0))
         if number < PLAIN:
             continue
-        before, weights = (
-            weights,
-            np.where(distance < scale, (1 - (distance / scale) ** 2) ** 2, 0.0),
-        )
+        before = weights
+        weights = np.where(distance < scale, (1 - (distance / scale) ** 2) ** 2, 0.0)
         if number > PLAIN + WIDE and np.abs(weights - before).max() < CHANGE:
             break
     used = weights > 0
@@ -141,8 +138,8 @@ def _solve(
     """(k,) coefficients by weighted least squares; ``known`` is a value of the last one and the
     weight of it."""
     normal = basis.T @ (basis * weights[:, None])
-    right = basis.T @ (values * weights)
+    towards = basis.T @ (values * weights)
     if known is not None:
         normal[-1, -1] += known[1] ** 2
-        right[-1] += known[0] * known[1] ** 2
-    return np.linalg.lstsq(normal, right, rcond=None)[0]
+        towards[-1] += known[0] * known[1] ** 2
+    return np.linalg.lstsq(normal, towards, rcond=None)[0]

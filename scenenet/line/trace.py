@@ -163,47 +163,60 @@ class _Guesses:
 
 def _near(pieces: Pieces, catenary: Catenary, beyond: float) -> np.ndarray:
     """(P,) bool, which pieces lie beside a wire, or less than ``beyond`` m past its ends."""
-    right, above = catenary.residuals(pieces.middle)
+    distance = np.hypot(*catenary.residuals(pieces.middle))
     along, _ = catenary.along(pieces.middle)
     inside = (along >= -beyond) & (along <= catenary.length + beyond)
-    return inside & (np.hypot(right, above) <= APART_M)
+    return inside & (distance <= APART_M)
 
 
 def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float) -> Wire | None:
     """The wire with all its points and its true ends, or None if too little of it is seen."""
     catenary = fit.catenary
-    right, above = catenary.residuals(stz)
     along, _ = catenary.along(stz)
-    distance = np.hypot(right, above)
+    distance = np.hypot(*catenary.residuals(stz))
     on = free & (distance <= IN_BUNDLE_M)
-    beside = free & (distance > IN_BUNDLE_M) & (distance <= RING_M)
     if not on.any():
         return None
+    beside = free & (distance > IN_BUNDLE_M) & (distance <= RING_M)
+    seen = _clear_stretch(along[on], along[beside], window)
+    if seen is None:
+        return None
+    low, high, covered = seen
+    if high - low < 2 * window or covered < MIN_COVERED:
+        return None
+    rows = np.flatnonzero(on & (along >= low) & (along <= high))
+    ends = catenary.between(along[rows].min(), along[rows].max())
+    return _bundled(stz, rows, ends, fit, covered)
+
+
+def _clear_stretch(
+    on: np.ndarray, beside: np.ndarray, window: float
+) -> tuple[float, float, float] | None:
+    """Where a wire hangs in free air: start and end, m along it, of the longest stretch without a
+    long gap, and the share of its halves of windows that are clear. None if none is.
+
+    Leaves are as dense around a wire as on it.
+
+    Args:
+        on, beside: m along the wire, of the points on it (n,) and of those in the ring around it.
+        window: m.
+    """
     half = window / 2
-    first = np.floor(along[on].min() / half)
-    n = int(np.floor(along[on].max() / half) - first) + 1
-    counts = [
-        np.bincount(
-            np.clip(np.floor(along[rows] / half) - first, 0, n - 1).astype(int), minlength=n
-        )
-        for rows in (on, beside)
-    ]
-    # A wire hangs in free air; leaves are as dense around it.
-    clear = np.flatnonzero((counts[0] > 0) & (counts[1] <= CROWDED * counts[0]))
+    first = np.floor(on.min() / half)
+    n = int(np.floor(on.max() / half) - first) + 1
+    n_on, n_beside = (
+        np.bincount(np.clip(np.floor(s / half) - first, 0, n - 1).astype(int), minlength=n)
+        for s in (on, beside)
+    )
+    clear = np.flatnonzero((n_on > 0) & (n_beside <= CROWDED * n_on))
     if len(clear) == 0:
         return None
     gaps = np.flatnonzero(np.diff(clear) * half > GAP_M)
     starts, stops = np.append(0, gaps + 1), np.append(gaps, len(clear) - 1)
     longest = int(np.argmax(stops - starts))
     part = clear[starts[longest] : stops[longest] + 1]
-    low, high = (first + part[0]) * half, (first + part[-1] + 1) * half
-    covered = len(part) / (part[-1] - part[0] + 1)
-    if high - low < 2 * window or covered < MIN_COVERED:
-        return None
-    inside = on & (along >= low) & (along <= high)
-    rows = np.flatnonzero(inside)
-    first, last = along[rows].min(), along[rows].max()
-    return _bundled(stz, rows, catenary.between(first, last), fit, float(covered))
+    covered = float(len(part) / (part[-1] - part[0] + 1))
+    return (first + part[0]) * half, (first + part[-1] + 1) * half, covered
 
 
 def _bundled(

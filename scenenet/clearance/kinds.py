@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from scenenet.clearance.ground_model import GroundModel
-from scenenet.pointcloud.class_schemes import ClassScheme
+from scenenet.pointcloud.class_schemes import ClassScheme, Role
 
 NO_OBSTACLE, ON_GROUND, PLANT, HOUSE = -1, 0, 1, 2
 """Kinds of points; those from 0 are numbers in ``scenenet.clearance.settings.KINDS``."""
@@ -57,6 +58,13 @@ class Surroundings:
     ground: GroundModel
 
 
+KIND_OF_ROLE: Mapping[Role, int] = {
+    "vegetation": PLANT, "building": HOUSE, "tower": NO_OBSTACLE, "conductor": NO_OBSTACLE,
+    "fitting": NO_OBSTACLE, "noise": NO_OBSTACLE,
+}  # fmt: skip
+"""Role of a class -> kind of its points; for the ground the scheme says which classes it is."""
+
+
 def kinds_from(scheme: ClassScheme | None) -> str:
     """Where the kinds of points are from, as every output says it."""
     if scheme is None:
@@ -68,12 +76,8 @@ def kind_table(scheme: ClassScheme) -> np.ndarray:
     """(256,) int8, the kind of each class code; ``BY_HEIGHT`` where that decides."""
     table = np.full(256, BY_HEIGHT, np.int8)
     table[scheme.is_ground(np.arange(256))] = ON_GROUND
-    for role, kind in (
-        ("vegetation", PLANT), ("building", HOUSE),
-        ("tower", NO_OBSTACLE), ("conductor", NO_OBSTACLE), ("fitting", NO_OBSTACLE),
-        ("noise", NO_OBSTACLE),
-    ):  # fmt: skip
-        table[list(scheme.with_role(role))] = kind  # type: ignore[arg-type]
+    for role, kind in KIND_OF_ROLE.items():
+        table[list(scheme.with_role(role))] = kind
     return table
 
 

@@ -111,24 +111,15 @@ def near_points(
         order = np.argsort(exact.distance, kind="stable")
         rows, along, distance = rows[order], exact.along[order], exact.distance[order]
         joined = np.flatnonzero(~lone[rows])
-
-        def point(
-            place: int,
-            conductor: Conductor = conductor,
-            rows: np.ndarray = rows,
-            along: np.ndarray = along,
-            distance: np.ndarray = distance,
-        ) -> NearPoint:
-            row = rows[place]
-            name = POINT_KINDS[kind[row]]
-            return NearPoint(conductor, name, xyz[row], float(along[place]), float(distance[place]))
-
         _, first = np.unique(kind[rows[joined]], return_index=True)
-        nearest += [point(place) for place in joined[first].tolist()]
+        for place in joined[first].tolist():
+            row = rows[place]
+            nearest.append(_near(conductor, kind[row], xyz[row], along[place], distance[place]))
         cells, first = np.unique(cell[rows[joined]], return_index=True)
         for each, place in zip(cells.tolist(), joined[first].tolist(), strict=True):
             if each not in steps or distance[place] < steps[each].distance:
-                steps[each] = point(place)
+                row = rows[place]
+                steps[each] = _near(conductor, kind[row], xyz[row], along[place], distance[place])
         closer = (distance < limit[rows]) & (distance < closest[rows])
         own = rows[closer]
         closest[own], at[own], owner[own] = distance[closer], along[closer], conductor.conductor_id
@@ -136,3 +127,10 @@ def near_points(
     too_near = TooNear(xyz[found], kind[found], owner[found], at[found], closest[found])
     by_step = tuple((each // len(POINT_KINDS), steps[each]) for each in sorted(steps))
     return Near(tuple(nearest), by_step, too_near)
+
+
+def _near(
+    conductor: Conductor, kind: int, xyz: np.ndarray, along: float, distance: float
+) -> NearPoint:
+    """A point of a kind, by its number."""
+    return NearPoint(conductor, POINT_KINDS[kind], xyz, float(along), float(distance))

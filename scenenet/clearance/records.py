@@ -4,26 +4,14 @@ tables."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Self
 
-from scenenet.core.columns import column, columns_of
-
-
-class _Record:
-    """A row that is written as JSON."""
-
-    def to_json(self) -> dict[str, Any]:
-        return {each.name: getattr(self, each.name) for each in fields(self)}  # type: ignore[arg-type]
-
-    @classmethod
-    def from_json(cls, data: Mapping[str, Any]) -> Self:
-        """What ``to_json`` gave."""
-        return cls(**data)
+from scenenet.core.columns import Record, column, columns_of
 
 
 @dataclass(frozen=True)
-class Clearance(_Record):
+class Clearance(Record):
     """A place of a conductor and what is near it. ``CLEARANCE_COLUMNS`` says what each column
     is."""
 
@@ -66,7 +54,7 @@ class Clearance(_Record):
 
 
 @dataclass(frozen=True)
-class FallTree(_Record):
+class FallTree(Record):
     """A tree that could fall on a conductor. ``TREE_COLUMNS`` says what each column is."""
 
     x: float = column("m", "easting of its top")
@@ -88,7 +76,7 @@ class FallTree(_Record):
 
 
 @dataclass(frozen=True)
-class SpanClearance(_Record):
+class SpanClearance(Record):
     """A span with the worst of what is near. ``SPAN_CLEARANCE_COLUMNS`` says what each column
     is."""
 
@@ -117,7 +105,7 @@ class SpanClearance(_Record):
 
 
 @dataclass(frozen=True)
-class ProfileStep(_Record):
+class ProfileStep(Record):
     """What is nearest to the conductors of a span in a step along it. ``PROFILE_COLUMNS`` says what
     each column is."""
 
@@ -187,21 +175,23 @@ class SurveyClearances:
         }
 
     def to_json(self) -> dict[str, Any]:
-        lists = {name: [row.to_json() for row in getattr(self, name)] for name in _LISTS}
-        return {**lists, "kinds": self.kinds, "limits": self.limits}
+        return {
+            "places": [place.to_json() for place in self.places],
+            "trees": [tree.to_json() for tree in self.trees],
+            "spans": [span.to_json() for span in self.spans],
+            "profile": [step.to_json() for step in self.profile],
+            "kinds": self.kinds,
+            "limits": self.limits,
+        }
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
         """What ``to_json`` gave."""
-        lists = {
-            name: tuple(kind.from_json(row) for row in data[name]) for name, kind in _LISTS.items()
-        }
-        return cls(**lists, kinds=data["kinds"], limits=data["limits"])  # type: ignore[arg-type]
-
-
-_LISTS: dict[str, type[_Record]] = {
-    "places": Clearance,
-    "trees": FallTree,
-    "spans": SpanClearance,
-    "profile": ProfileStep,
-}
+        return cls(
+            places=tuple(map(Clearance.from_json, data["places"])),
+            trees=tuple(map(FallTree.from_json, data["trees"])),
+            spans=tuple(map(SpanClearance.from_json, data["spans"])),
+            profile=tuple(map(ProfileStep.from_json, data["profile"])),
+            kinds=data["kinds"],
+            limits=data["limits"],
+        )

@@ -3,11 +3,15 @@ what it is, and the files, the report and the reference pages follow from that."
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from types import NoneType, UnionType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Self, TypeVar, get_args, get_origin, get_type_hints
 
-Row = TypeVar("Row")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Row = TypeVar("Row", bound="DataclassInstance")
 
 
 def column(
@@ -44,6 +48,19 @@ class FieldColumn:
         return getattr(row, self.name)
 
 
+@dataclass(frozen=True)
+class Record:
+    """A row that is kept as JSON between the stages of a program."""
+
+    def to_json(self) -> dict[str, Any]:
+        return {each.name: getattr(self, each.name) for each in fields(self)}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Self:
+        """What ``to_json`` gave."""
+        return cls(**data)
+
+
 def columns_of(kind: type) -> tuple[FieldColumn, ...]:
     """The columns that a dataclass declares with ``column``, in order."""
     types = get_type_hints(kind)
@@ -78,4 +95,4 @@ def in_units(row: Row, sizes: tuple[float, float, float]) -> Row:
     known = [(c, c.value(row)) for c in lengths if c.value(row) is not None]
     return replace(
         row, **{c.name: value / (vertical if c.vertical else planar) for c, value in known}
-    )  # type: ignore[type-var]
+    )

@@ -4,10 +4,10 @@ the columns of their tables."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Self
 
-from scenenet.core.columns import column, columns_of
+from scenenet.core.columns import Record, column, columns_of
 from scenenet.line.catenary import Catenary
 
 AS_FLOWN = (
@@ -31,7 +31,9 @@ class Conductor:
     conductor_id: int = column(
         "", "number in its span, from left to right and then from the top", heading="conductor"
     )
-    kind: str = column("", "conductor, earth wire, or cable for one of no line", heading="kind")
+    kind: str = column(
+        "", "conductor, earth wire, or cable: a wire of no line, or a slack one", heading="kind"
+    )
     subconductors: int = column("", "number of wires of its bundle", heading="subconductors")
     from_tower: int = column("", "id of the tower at its start, 0 for none")
     to_tower: int = column("", "id of the tower at its end, 0 for none")
@@ -82,7 +84,7 @@ class Conductor:
 
 
 @dataclass(frozen=True)
-class LineSpan:
+class LineSpan(Record):
     """A span of a line. ``SPAN_COLUMNS`` says what each column is.
 
     Attributes:
@@ -112,19 +114,14 @@ class LineSpan:
         "cable", heading="ends",
     )  # fmt: skip
 
-    def to_json(self) -> dict[str, Any]:
-        return {f.name: getattr(self, f.name) for f in fields(self)}
-
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:
         """What ``to_json`` gave."""
-        own = dict(data)
-        own["start"], own["end"] = tuple(own["start"]), tuple(own["end"])
-        return cls(**own)
+        return cls(**{**data, "start": tuple(data["start"]), "end": tuple(data["end"])})
 
 
 @dataclass(frozen=True)
-class LineNote:
+class LineNote(Record):
     """A place that a person should look at. ``NOTE_COLUMNS`` says what each column is."""
 
     x: float = column("m", "easting", heading="x")
@@ -132,9 +129,6 @@ class LineNote:
     what: str = column("", "tower expected, or tower without a conductor", heading="what")
     tower: int = column("", "id of the tower there, 0 for none", heading="tower")
     span_id: int = column("", "number of the span that says it, 0 for none", heading="span")
-
-    def to_json(self) -> dict[str, Any]:
-        return {c.name: c.value(self) for c in NOTE_COLUMNS}
 
 
 EXPECTED, UNHELD = "tower expected", "tower without a conductor"
@@ -177,5 +171,5 @@ class SurveyLine:
         return cls(
             tuple(map(LineSpan.from_json, data["spans"])),
             tuple(map(Conductor.from_json, data["conductors"])),
-            tuple(LineNote(**note) for note in data["notes"]),
+            tuple(map(LineNote.from_json, data["notes"])),
         )

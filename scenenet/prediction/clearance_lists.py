@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +14,7 @@ from scenenet.clearance.records import (
     TREE_COLUMNS,
     SurveyClearances,
 )
-from scenenet.core.columns import FieldColumn
-from scenenet.prediction.line_lists import write_rows, write_table
+from scenenet.prediction.record_files import RecordLayer, write_layers, write_table
 
 if TYPE_CHECKING:
     import pyproj
@@ -58,11 +56,9 @@ def write_clearance_layers(
     ]
     feet = [shapely.Point(np.array([t.x, t.y, t.ground]) / scale) for t in clearances.trees]
     steps = [shapely.Point(np.array([s.x, s.y, s.z]) / scale) for s in clearances.profile]
-    layers: list[tuple[str, str, list[Any], Sequence[Any], Sequence[FieldColumn]]] = [
-        ("clearances", "LineString Z", apart, clearances.places, CLEARANCE_COLUMNS),
-        ("fall_trees", "Point Z", feet, clearances.trees, TREE_COLUMNS),
-        ("clearance_profile", "Point Z", steps, clearances.profile, PROFILE_COLUMNS),
+    layers = [
+        RecordLayer("clearances", "LineString Z", apart, clearances.places, CLEARANCE_COLUMNS),
+        RecordLayer("fall_trees", "Point Z", feet, clearances.trees, TREE_COLUMNS),
+        RecordLayer("clearance_profile", "Point Z", steps, clearances.profile, PROFILE_COLUMNS),
     ]
-    for name, kind, geometry, rows, columns in layers:
-        write_rows(path, name, kind, geometry, rows, columns, crs, sizes)
-    return [name for name, *_ in layers]
+    return write_layers(path, layers, crs, sizes)

@@ -7,21 +7,10 @@ import json
 import laspy
 import numpy as np
 import pytest
+from fixtures.measurement_file import BRIGHT
 
 from scenenet.core.provided_code import MEASUREMENTS, _provided
 
-BRIGHT = """\
-from scenenet.measurement import Measurement, register
-
-
-@register
-class Bright(Measurement):
-    name = "bright"
-    needs = frozenset({"intensity"})
-
-    def of_points(self, points):
-        return (points.intensity > 30_000).astype(float)
-"""
 SIGN, POST = 14, 6
 
 

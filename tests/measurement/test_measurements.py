@@ -7,6 +7,7 @@ import os
 import laspy
 import numpy as np
 import pytest
+from fixtures.measurement_file import BRIGHT
 from fixtures.spools import spool_of
 from hypothesis import given
 from hypothesis import strategies as st
@@ -22,19 +23,6 @@ from scenenet.models.scenenet import SceneNet
 from scenenet.pointcloud import PointCloud, iter_chunks, read
 from scenenet.pointcloud.class_schemes import ASPRS
 from scenenet.prediction.work.tile_predictor import TilePredictor
-
-BRIGHT = """\
-from scenenet.measurement import Measurement, register
-
-
-@register
-class Bright(Measurement):
-    name = "bright"
-    needs = frozenset({"intensity"})
-
-    def of_points(self, points):
-        return (points.intensity > 30_000).astype(float)
-"""
 
 
 @pytest.fixture(autouse=True)

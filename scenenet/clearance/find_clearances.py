@@ -26,7 +26,7 @@ from scenenet.clearance.settings import KINDS, WIRE, ClearanceLimits, ClearanceS
 from scenenet.clearance.trees import Trees
 from scenenet.core.progress import track
 from scenenet.line.frame import SpanFrame
-from scenenet.line.records import AS_FLOWN, Conductor, LineSpan, SurveyLine
+from scenenet.line.records import Conductor, LineSpan, SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 
 SAME_TREE_M = 1.0
@@ -141,7 +141,7 @@ class _Finder:
             dangers=len(dangers), few_points=sum(bool(place.note) for place in dangers),
             danger_points=sum(place.points for place in dangers), fall_trees=len(falling),
             fall_margin=min((tree.margin for tree in falling), default=None),
-            kinds=self.kinds, limits=self.limits_named, positions=AS_FLOWN,
+            kinds=self.kinds, limits=self.limits_named,
         )  # fmt: skip
 
     def _areas(self, frame: SpanFrame, own: Sequence[Conductor]) -> list[Area]:
@@ -188,7 +188,7 @@ class _Finder:
             margin=None if limit is None else point.distance - limit, points=points,
             note="few points" if few else "", along=point.along, x=x, y=y, z=z,
             wire_x=float(on[0]), wire_y=float(on[1]), wire_z=float(on[2]), other_span=other_span,
-            kinds=self.kinds, positions=AS_FLOWN,
+            kinds=self.kinds,
         )  # fmt: skip
 
     def _crossing(self, each: Crossing) -> Clearance:
@@ -212,7 +212,7 @@ class _Finder:
                 ground=float(trees.feet[row, 2]), height=float(trees.height[row]),
                 distance=float(distance[wire[row], row]), margin=float(margin[row]),
                 span_id=own[wire[row]].span_id, conductor_id=own[wire[row]].conductor_id,
-                along=float(near[wire[row]].along[row]), kinds=self.kinds, positions=AS_FLOWN,
+                along=float(near[wire[row]].along[row]), kinds=self.kinds,
             )
             for row in np.flatnonzero(margin < self._settings.fall_reserve).tolist()
         ]  # fmt: skip

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from scenenet.core.columns import Record, column, columns_of
+from scenenet.line.records import positions_column
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Clearance(Record):
     wire_z: float = column("m", "elevation of the nearest place on the conductor", vertical=True)
     other_span: int = column("", "number of the span of a wire that is near, 0 for none")
     kinds: str = column("", "where the kinds of points are from")
-    positions: str = column("", "what positions of wires are")
+    positions: str = positions_column()
 
     @property
     def order(self) -> float:
@@ -72,7 +73,7 @@ class FallTree(Record):
     conductor_id: int = column("", "number of the conductor in its span", heading="conductor")
     along: float = column("m", "horizontal distance from the start of the conductor")
     kinds: str = column("", "where the kinds of points are from")
-    positions: str = column("", "what positions of wires are")
+    positions: str = positions_column()
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class SpanClearance(Record):
     fall_margin: float | None = column("m", "smallest margin of these trees; none without one")
     kinds: str = column("", "where the kinds of points are from")
     limits: str = column("", "voltage and source of the limits; none without a voltage")
-    positions: str = column("", "what positions of wires are")
+    positions: str = positions_column()
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ class ProfileStep(Record):
     y: float = column("m", "northing of the point")
     z: float = column("m", "elevation of the point", vertical=True)
     wire_z: float = column("m", "elevation of the nearest place on the conductor", vertical=True)
+    positions: str = positions_column()
 
 
 CLEARANCE_COLUMNS = columns_of(Clearance)

@@ -4,7 +4,7 @@ what it is, and the files, the report and the reference pages follow from that."
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Any, Self, TypeVar, get_args, get_origin, get_type_hints
 
@@ -15,11 +15,17 @@ Row = TypeVar("Row", bound="DataclassInstance")
 
 
 def column(
-    unit: str, description: str, *, heading: str | None = None, vertical: bool = False
+    unit: str,
+    description: str,
+    *,
+    heading: str | None = None,
+    vertical: bool = False,
+    default: Any = MISSING,
 ) -> Any:
-    """A field that is a column; arguments as the attributes of ``FieldColumn``."""
+    """A field that is a column; arguments as the attributes of ``FieldColumn``, and the value of
+    rows that do not say it."""
     facts = {"unit": unit, "description": description, "heading": heading, "vertical": vertical}
-    return field(metadata=facts)
+    return field(metadata=facts, default=default)
 
 
 @dataclass(frozen=True)

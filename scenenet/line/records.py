@@ -16,6 +16,11 @@ AS_FLOWN = (
 """What every output about the wires of a line says of their positions."""
 
 
+def positions_column() -> Any:
+    """The column in which rows about wires say this."""
+    return column("", "what positions of wires are", default=AS_FLOWN)
+
+
 @dataclass(frozen=True)
 class Conductor:
     """A conductor or an earth wire of a span. ``CONDUCTOR_COLUMNS`` says what each column is.
@@ -65,6 +70,7 @@ class Conductor:
         "m", "height of its end above the foot of the tower there; 0 without a tower",
         vertical=True,
     )  # fmt: skip
+    positions: str = positions_column()
 
     def to_json(self) -> dict[str, Any]:
         own = {c.name: c.value(self) for c in CONDUCTOR_COLUMNS}
@@ -113,6 +119,7 @@ class LineSpan(Record):
         "", "what is known of its ends: between towers, leaves the survey, tower expected, or "
         "cable", heading="ends",
     )  # fmt: skip
+    positions: str = positions_column()
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> Self:

@@ -133,8 +133,9 @@ def test_the_worst_comes_first_and_spans_say_it(found, corridor):
 
 
 def test_every_output_says_where_kinds_are_from_and_what_positions_are(found):
-    for row in (*found.places, *found.trees, *found.spans):
+    for row in (*found.places, *found.trees, *found.spans, *found.profile):
         assert row.positions == AS_FLOWN
+    for row in (*found.places, *found.trees, *found.spans):
         assert row.kinds == found.kinds
     assert "height above ground" in found.kinds
     assert all(row.limits.startswith("66 kV: examples") for row in found.spans)

@@ -113,6 +113,7 @@ def test_the_layers_have_the_rows_of_the_tables(predicted):
         info = pyogrio.read_info(predicted.geopackage, layer=layer)
         assert info["features"] == len(rows(table))
         assert list(info["fields"]) == list(rows(table)[0])
+        assert {row["positions"] for row in rows(table)} == {AS_FLOWN}
     wires = pyogrio.raw.read(predicted.geopackage, layer="conductors")
     assert wires[0]["geometry_type"] == "LineString Z"
 

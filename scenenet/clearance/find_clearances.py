@@ -26,7 +26,7 @@ from scenenet.clearance.settings import KINDS, WIRE, ClearanceLimits, ClearanceS
 from scenenet.clearance.trees import Trees
 from scenenet.core.progress import track
 from scenenet.line.frame import SpanFrame
-from scenenet.line.records import Conductor, LineSpan, SurveyLine
+from scenenet.line.records import AS_FLOWN, Conductor, LineSpan, SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 
 SAME_TREE_M = 1.0
@@ -141,7 +141,7 @@ class _Finder:
             dangers=len(dangers), few_points=sum(bool(place.note) for place in dangers),
             danger_points=sum(place.points for place in dangers), fall_trees=len(falling),
             fall_margin=min((tree.margin for tree in falling), default=None),
-            kinds=self.kinds, limits=self.limits_named,
+            kinds=self.kinds, limits=self.limits_named, positions=AS_FLOWN,
         )  # fmt: skip
 
     def _areas(self, frame: SpanFrame, own: Sequence[Conductor]) -> list[Area]:

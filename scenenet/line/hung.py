@@ -9,7 +9,7 @@ import numpy as np
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.frame import SpanFrame
-from scenenet.line.trace import Wire, trace_wires
+from scenenet.line.trace import TAUTEST_M, Wire, trace_wires
 from scenenet.line.wire_points import WirePoints
 
 REACH_M = 16.0
@@ -31,9 +31,8 @@ WORST_M = 0.12
 """m, greatest root mean square distance of the points of a wire from its catenary. Leaves within
 the tube of a wire are about 0.17 m from it; a scanner measures to 0.05 m."""
 
-TAUTEST_M, LONG_M = 10_000.0, 150.0
-"""m, greatest catenary parameter of a wire of this length or more: what its strength allows. The
-curvature of a shorter one is not known well enough to say."""
+LONG_M = 150.0
+"""m, length from which the points of a wire say for certain that it is too straight."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ import numpy as np
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.frame import SpanFrame
-from scenenet.line.hung import REACH_M, TAUTEST_M, HungWire, LineTower, TracedSpan, traced
+from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
+from scenenet.line.trace import TAUTEST_M
 from scenenet.line.wire_points import WirePoints
 
 MIN_ALONE_M, MIN_HELD_M = 25.0, 15.0

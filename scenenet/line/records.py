@@ -133,12 +133,16 @@ class LineNote(Record):
 
     x: float = column("m", "easting", heading="x")
     y: float = column("m", "northing", heading="y")
-    what: str = column("", "tower expected, or tower without a conductor", heading="what")
+    what: str = column(
+        "", "tower expected; tower without a conductor; or tower found where the line expected one",
+        heading="what",
+    )  # fmt: skip
     tower: int = column("", "id of the tower there, 0 for none", heading="tower")
     span_id: int = column("", "number of the span that says it, 0 for none", heading="span")
 
 
 EXPECTED, UNHELD = "tower expected", "tower without a conductor"
+FOUND_AGAIN = "tower found where the line expected one"
 """What the line says of a place."""
 
 CONDUCTOR_COLUMNS = columns_of(Conductor)

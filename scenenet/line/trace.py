@@ -8,7 +8,7 @@ import numpy as np
 
 from scenenet.line.bundles import subconductors
 from scenenet.line.catenary import Catenary
-from scenenet.line.fit import SHORTEST_PARAMETER_M, Fit, Prior, fit_catenary
+from scenenet.line.fit import NOISE_M, SHORTEST_PARAMETER_M, Fit, Prior, fit_catenary
 from scenenet.line.pieces import APART_M, WINDOW_M, Pieces, find_pieces, window_of
 
 ON_WIRE_M = 0.35
@@ -42,6 +42,13 @@ MIN_COVERED = 0.3
 USUAL = Prior(1 / 1500.0, 1 / 1500.0)
 """Curvature of the wires of power lines: c is mostly from 500 to 2500 m. It only decides where a
 wire is too short to show its own."""
+
+TAUTEST_M = 10_000.0
+"""m, greatest catenary parameter of a wire: what its strength allows."""
+
+BENT_M, BENT_RMSE_M, CLOSER = 40.0, 2 * NOISE_M, 0.7
+"""m, length and m, root mean square distance from which a wire may be two that meet at a crossarm,
+and share of this distance at which a part of it must be nearer to its points."""
 
 PRIOR_SPREAD = 0.15
 """Standard deviation of the curvature of wires of a span, as a share of their median."""
@@ -91,10 +98,14 @@ def trace_wires(stz: np.ndarray, limit: int = 80) -> list[Wire]:
                 break
             guesses = _Guesses(pieces, left, window)
             continue
+        fit = _fit(stz, pieces, support, free, _prior(found))
+        while fit is not None and _may_bend(fit):
+            part = _to_bend(pieces, support, fit, window)
+            closer = _fit(stz, pieces, part, free, _prior(found))
+            if closer is None or closer.rmse > CLOSER * fit.rmse:
+                break
+            support, fit = part, closer
         left[support] = False
-        rows = np.unique(np.concatenate([pieces.members[number] for number in support]))
-        rows = rows[free[rows]]
-        fit = fit_catenary(stz[rows], np.ones(len(rows)), _prior(found))
         wire = None if fit is None else _supported(stz, fit, free, window)
         if wire is None:
             continue
@@ -103,6 +114,38 @@ def trace_wires(stz: np.ndarray, limit: int = 80) -> list[Wire]:
         free[wire.rows] = False
         found.append(wire)
     return found
+
+
+def _fit(
+    stz: np.ndarray, pieces: Pieces, support: np.ndarray, free: np.ndarray, prior: Prior
+) -> Fit | None:
+    """The wire through the points of pieces that are on no other wire; None if there are too
+    few."""
+    if len(support) == 0:
+        return None
+    rows = np.unique(np.concatenate([pieces.members[number] for number in support]))
+    rows = rows[free[rows]]
+    return fit_catenary(stz[rows], np.ones(len(rows)), prior)
+
+
+def _may_bend(fit: Fit) -> bool:
+    """Whether a wire may be two that meet at a crossarm: it is long, and too straight or too far
+    from its points for one."""
+    curve = fit.catenary
+    return curve.length >= BENT_M and (curve.parameter > TAUTEST_M or fit.rmse > BENT_RMSE_M)
+
+
+def _to_bend(pieces: Pieces, support: np.ndarray, fit: Fit, window: float) -> np.ndarray:
+    """The larger part of the pieces of a wire, from one end to where they are highest above it:
+    wires that meet at a crossarm are highest there. No piece if that is at an end."""
+    along, _ = fit.catenary.along(pieces.middle[support])
+    _, above = fit.catenary.residuals(pieces.middle[support])
+    inner = (along >= window) & (along <= along.max() - window)
+    if not inner.any():
+        return support[:0]
+    before = along < along[inner][np.argmax(above[inner])]
+    weight = pieces.weight[support]
+    return support[before if weight[before].sum() >= weight[~before].sum() else ~before]
 
 
 class _Guesses:

@@ -1,16 +1,20 @@
-"""The lines of a survey: found in the predictions of a model of wires, from tower to tower."""
+"""The lines of a survey: found in the predictions of a model of wires, from tower to tower, and
+the towers that they ask for."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.line.find_line import find_line
-from scenenet.line.hung import LineTower
-from scenenet.line.records import SurveyLine
+from scenenet.line.hung import REACH_M, LineTower
+from scenenet.line.records import EXPECTED, FOUND_AGAIN, UNHELD, LineNote, SurveyLine
 from scenenet.line.wire_points import WirePoints
+from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_near
 from scenenet.prediction.surroundings import occupied_voxels
 from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tiling import TileSpool, groups
@@ -20,45 +24,109 @@ DOUBTFUL = 0.7
 a single thin wire, such as an earth wire, and of wires close to trees."""
 
 
-def find_line_in_survey(
-    spool: TileSpool,
-    wires: TileSpool,
-    predictions: TilePredictions,
-    tau: float,
-    towers: Iterable[SurveyTower],
-    unit_sizes: tuple[float, float, float],
-    progress: str | None = None,
-) -> SurveyLine:
-    """Find the lines of a survey.
+AGAIN_M = REACH_M
+"""m around a place at which the line expects a tower, in which it is looked for again: its wires
+end at its crossarms."""
 
-    Args:
-        spool: the points of all its files.
-        wires: its voxels, those that the model of wires observes.
+
+@dataclass(frozen=True)
+class WireSearch:
+    """What the conductors of a survey are looked for in.
+
+    Attributes:
+        spool: the voxels of the survey that a model of wires observes.
         predictions: of that model, for all its tiles.
         tau: of that model.
-        towers: found in the survey, in its units.
-        unit_sizes: sizes in m of the units of its x, y and z.
+    """
+
+    spool: TileSpool
+    predictions: TilePredictions
+    tau: float
+
+
+@dataclass(frozen=True)
+class FoundLine:
+    """The lines of a survey.
+
+    Attributes:
+        line: m.
+        towers: of the survey, with those that the line asked for.
+    """
+
+    line: SurveyLine
+    towers: FoundTowers
+
+    def to_json(self) -> dict[str, Any]:
+        return {"line": self.line.to_json(), "towers": self.towers.to_json()}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> FoundLine:
+        """What ``to_json`` gave."""
+        return cls(SurveyLine.from_json(data["line"]), FoundTowers.from_json(data["towers"]))
+
+
+def find_line_in_survey(
+    wires: WireSearch, towers: TowerSearch, found: FoundTowers, progress: str | None = None
+) -> FoundLine:
+    """Find the lines of a survey, and the towers that they ask for.
+
+    Where wires end in the air amid the survey, a tower is expected and looked for once more. It is
+    kept if the line then leads to it.
+
+    Args:
+        found: the towers of the survey.
         progress: label of the progress on stderr; None shows no progress.
     """
-    points = _wire_points(spool, wires, predictions, tau)
-    known = [_in_metres(tower, unit_sizes) for tower in towers]
-    return find_line(points, known, occupied_voxels(spool), progress)
+    points = _wire_points(wires, towers.spool)
+    seen = occupied_voxels(towers.spool)
+
+    def between(own: FoundTowers) -> SurveyLine:
+        known = [_in_metres(tower, towers.unit_sizes) for tower in own.towers]
+        return find_line(points, known, seen, progress)
+
+    line = between(found)
+    more = _with_expected(line, towers, found)
+    if more is found:
+        return FoundLine(line, found)
+    line = between(more)
+    places = {(tower.x, tower.y) for tower in found.towers}
+    again = {tower.id: tower for tower in more.towers if (tower.x, tower.y) not in places}
+    idle = {note.tower for note in line.notes if note.what == UNHELD} & again.keys()
+    if idle:
+        more = more.without(idle)
+        line = between(more)
+    planar = towers.unit_sizes[0]
+    notes = (
+        LineNote(tower.x * planar, tower.y * planar, FOUND_AGAIN, number, 0)
+        for number, tower in again.items()
+        if number not in idle
+    )
+    return FoundLine(replace(line, notes=(*line.notes, *notes)), more)
 
 
-def _wire_points(
-    spool: TileSpool, wires: TileSpool, predictions: TilePredictions, tau: float
-) -> WirePoints:
-    """The points in voxels that may be on wires. They alone are in memory."""
+def _with_expected(line: SurveyLine, towers: TowerSearch, found: FoundTowers) -> FoundTowers:
+    """The towers with those that are found where the line expects one; ``found`` itself if none
+    is."""
+    more = found
+    for note in line.notes:
+        if note.what == EXPECTED:
+            near = find_near(towers, np.array([note.x, note.y]), AGAIN_M)
+            more = more.with_others(near, towers.settings.eps, towers.unit_sizes)
+    return more if len(more.towers) > len(found.towers) else found
+
+
+def _wire_points(wires: WireSearch, spool: TileSpool) -> WirePoints:
+    """The points of a spool in voxels that may be on wires. They alone are in memory."""
     found = {}
-    for code, _ in wires.places():
-        prediction = predictions.read(code)
-        near = prediction.probability >= DOUBTFUL * tau
+    for code, _ in wires.spool.places():
+        prediction = wires.predictions.read(code)
+        near = prediction.probability >= DOUBTFUL * wires.tau
         if near.any():
-            found[code] = prediction.voxel[near], prediction.probability[near] >= tau
+            found[code] = prediction.voxel[near], prediction.probability[near] >= wires.tau
     places, sure = [np.empty((0, 3))], [np.empty(0, bool)]
     for tile, _ in spool.places() if found else ():
         xyz = spool.points(tile)
-        codes, voxels = wires.lattice.locate(xyz)
+        codes, voxels = wires.spool.lattice.locate(xyz)
         for code, rows in groups(codes):
             if code in found:
                 own, certain = found[code]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
+from math import hypot, inf
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,33 @@ class FoundTowers:
         """No tower, because none was looked for."""
         return cls((), Structures(()))
 
+    def with_others(
+        self, others: FoundTowers, apart: float, unit_sizes: tuple[float, float, float]
+    ) -> FoundTowers:
+        """These towers, and those of ``others`` at other places, numbered together.
+
+        Args:
+            apart: m, distance from all of these that makes a place another one.
+            unit_sizes: sizes in m of the units of x, y and z of the survey.
+        """
+        pairs = list(zip(self.towers, self.structures.numbered, strict=True))
+        for tower, numbered in zip(others.towers, others.structures.numbered, strict=True):
+            away = [hypot(tower.x - t.x, tower.y - t.y) * unit_sizes[0] for t, _ in pairs]
+            if min(away, default=inf) > apart:
+                pairs.append((tower, numbered))
+        pairs.sort(key=lambda pair: (-pair[0].probability, pair[0].x, pair[0].y))
+        places = np.array([(tower.x, tower.y) for tower, _ in pairs]).reshape(-1, 2)
+        ids = tower_ids(places * unit_sizes[0])
+        towers = (replace(tower, id=n) for (tower, _), n in zip(pairs, ids, strict=True))
+        shapes = (shape for _, (_, shape) in pairs)
+        return FoundTowers(tuple(towers), Structures(tuple(zip(ids, shapes, strict=True))))
+
+    def without(self, ids: Collection[int]) -> FoundTowers:
+        """These towers, less those with one of the ``ids``. The others keep their numbers."""
+        numbered = (each for each in self.structures.numbered if each[0] not in ids)
+        towers = (tower for tower in self.towers if tower.id not in ids)
+        return FoundTowers(tuple(towers), Structures(tuple(numbered)))
+
     def to_json(self) -> dict[str, Any]:
         features = [tower.to_feature([tower.x, tower.y, tower.base]) for tower in self.towers]
         return {"towers": features, "structures": self.structures.to_json()}
@@ -47,27 +75,65 @@ class FoundTowers:
         return cls(towers, Structures.from_json(data["structures"]))
 
 
-def find_in_survey(
-    spool: TileSpool,
-    predictions: TilePredictions,
-    unit_sizes: tuple[float, float, float],
-    tau: float,
-    settings: DetectionSettings,
-    progress: str | None = None,
-) -> FoundTowers:
+@dataclass(frozen=True)
+class TowerSearch:
+    """What towers of a survey are looked for in, and how.
+
+    Attributes:
+        spool: the voxels and points of all its files.
+        predictions: of a model of towers, for all its tiles.
+        unit_sizes: sizes in m of the units of its x, y and z.
+        tau: of the model.
+        settings: of the detection.
+    """
+
+    spool: TileSpool
+    predictions: TilePredictions
+    unit_sizes: tuple[float, float, float]
+    tau: float
+    settings: DetectionSettings
+
+
+def find_in_survey(search: TowerSearch, progress: str | None = None) -> FoundTowers:
     """Find the towers of a survey.
 
     Args:
-        spool: the voxels and points of all its files.
-        predictions: for all its tiles.
-        unit_sizes: sizes in m of the units of its x, y and z.
-        tau: of the model.
         progress: label of the progress on stderr; None shows no progress.
     """
-    zyx, probability, shares = predictions.detected(spool, settings.threshold(tau))
+    threshold = search.settings.threshold(search.tau)
+    return _find(search, *search.predictions.detected(search.spool, threshold), progress)
+
+
+def find_near(search: TowerSearch, place: np.ndarray, radius: float) -> FoundTowers:
+    """Find the towers within a radius in m of a place (2,) m, whatever the model says of the voxels
+    there. All other rules hold; a tower whose voxels are all below tau needs twice the length of
+    conductor.
+    """
+    spool, (low, high) = search.spool, (place - radius, place + radius)
+    columns = spool.columns()
+    around = spool.lattice.columns((low[0], high[0]), (low[1], high[1]))
+    codes = [code for column in around for code in columns.get(column, ())]
+    zyx, probability, shares = search.predictions.detected(spool, 0.0, codes)
+    inside = np.hypot(*(spool.centres(zyx)[:, :2] - place).T) <= radius
+    # Axes are means weighted by probability, so none may be 0.
+    at_least = np.maximum(probability[inside], np.finfo(np.float32).tiny)
+    return _find(search, zyx[inside], at_least, shares[inside])
+
+
+def _find(
+    search: TowerSearch,
+    zyx: np.ndarray,
+    probability: np.ndarray,
+    shares: np.ndarray,
+    progress: str | None = None,
+) -> FoundTowers:
+    """The towers among voxels (``TilePredictions.detected``)."""
+    spool = search.spool
     occupied, points = occupied_voxels(spool), survey_points(spool)
-    centres, size = spool.centres(zyx), spool.voxel_size
-    found = find_towers(centres, probability, occupied, points, size, tau, settings, progress)
+    found = find_towers(
+        spool.centres(zyx), probability, occupied, points, spool.voxel_size, search.tau,
+        search.settings, progress,
+    )  # fmt: skip
     numbers = tower_ids(np.array([(tower.x, tower.y) for tower in found]).reshape(-1, 2))
     shapes = (tower.structure for tower in found)
     structures = Structures(tuple(zip(numbers, shapes, strict=True)))
@@ -79,9 +145,9 @@ def find_in_survey(
         n_own = int(np.count_nonzero(owners(inside) == number))
         distance = edge_distance(place, occupied(place, MAX_M * 1.5)[:, :2])
         means = shares[tower.voxels].mean(axis=0).tolist()
-        contributions = dict(zip(predictions.geneos, means, strict=True))
+        contributions = dict(zip(search.predictions.geneos, means, strict=True))
         entry = _entry(tower, number, n_own, distance, contributions)
-        towers.append(entry.in_units(unit_sizes))
+        towers.append(entry.in_units(search.unit_sizes))
     return FoundTowers(tuple(towers), structures)
 
 

@@ -23,8 +23,8 @@ from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.targets import WIRE
 from scenenet.prediction.found_clearances import WireVoxels, find_clearances_in_survey
-from scenenet.prediction.found_line import find_line_in_survey
-from scenenet.prediction.found_towers import FoundTowers, find_in_survey
+from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
+from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_in_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
 from scenenet.prediction.survey_prediction import FurtherModel, SurveyPrediction
@@ -101,12 +101,11 @@ def predict_survey(
         joined = SurveyWork.open(survey, folder.reads(survey))
         tiles = [_predict_files(joined, folder, each) for each in used]
         found = FoundTowers.none()
+        search = TowerSearch(joined.spool, tiles[0], joined.system.unit_sizes, tau, detection)
         if first.target.is_tower:
             if not folder.towers.exists():
                 label = f"{survey.given.name}: candidates measured"
-                units = joined.system.unit_sizes
-                found = find_in_survey(joined.spool, tiles[0], units, tau, detection, label)
-                write_json(folder.towers, found.to_json())
+                write_json(folder.towers, find_in_survey(search, label).to_json())
             found = FoundTowers.from_json(read_json(folder.towers))
         further = [
             FurtherModel(each, joined.spool_at(each.layer), predicted)
@@ -115,7 +114,9 @@ def predict_survey(
         line, clearances = None, None
         wires = next((each for each in further if each.used.target.name == WIRE), None)
         if first.target.is_tower and wires is not None:
-            line = _line(joined, folder, found, wires)
+            conductors = WireSearch(wires.spool, wires.tiles, wires.used.card.threshold())
+            lines = _line(folder, conductors, search, found, f"{survey.given.name}: spans traced")
+            line, found = lines.line, lines.towers
             own = clearance or ClearanceSettings()
             clearances = _clearances(joined, folder, found, wires, line, own, scheme)
         yield SurveyPrediction.of(
@@ -187,21 +188,12 @@ def _predict_files(joined: SurveyWork, folder: WorkFolder, used: UsedModel) -> T
 
 
 def _line(
-    joined: SurveyWork, folder: WorkFolder, found: FoundTowers, wires: FurtherModel
-) -> SurveyLine:
+    folder: WorkFolder, wires: WireSearch, towers: TowerSearch, found: FoundTowers, label: str
+) -> FoundLine:
     """The lines between the towers of a survey."""
     if not folder.line.exists():
-        line = find_line_in_survey(
-            joined.spool,
-            wires.spool,
-            wires.tiles,
-            wires.used.card.threshold(),
-            found.towers,
-            joined.system.unit_sizes,
-            f"{joined.survey.given.name}: spans traced",
-        )
-        write_json(folder.line, line.to_json())
-    return SurveyLine.from_json(read_json(folder.line))
+        write_json(folder.line, find_line_in_survey(wires, towers, found, label).to_json())
+    return FoundLine.from_json(read_json(folder.line))
 
 
 def _clearances(

@@ -57,6 +57,16 @@ def test_a_gap_is_bridged_where_the_catenary_says_so():
     assert nearest([wire], hung(0.0, 25.0)) < 0.03
 
 
+def test_wires_that_meet_at_a_crossarm_are_two():
+    rng = np.random.default_rng(0)
+    # A straight line from end to end is nowhere further than 0.4 m from either.
+    true = [Catenary((s, 0.0, 20.0), (s + 75.0, 0.0, 20.0), 900.0) for s in (0.0, 75.0)]
+    wires = trace_wires(np.concatenate([points_on(wire, 1.0, rng) for wire in true]))
+    assert len(wires) == 2
+    assert max(nearest(wires, wire) for wire in true) < 0.03
+    assert [wire.fit.catenary.parameter for wire in wires] == pytest.approx([900, 900], rel=0.05)
+
+
 def test_leaves_hide_no_wire_and_make_none_from_tower_to_tower():
     rng = np.random.default_rng(5)
     leaves = rng.uniform((60.0, -8.0, 10.0), (120.0, 8.0, 24.0), (3000, 3))

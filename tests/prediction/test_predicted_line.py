@@ -18,11 +18,14 @@ from fixtures.scenes import model_card
 
 from scenenet.detection.settings import DetectionSettings
 from scenenet.line.catenary import Catenary
-from scenenet.line.records import AS_FLOWN
+from scenenet.line.records import AS_FLOWN, FOUND_AGAIN
 from scenenet.models.factory import new_model
 from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, write_las
 from scenenet.pointcloud.targets import Target
+from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
+from scenenet.prediction.found_towers import TowerSearch, find_in_survey
+from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.writers import predict_to_files
@@ -94,6 +97,27 @@ def test_the_conductor_is_traced_from_pole_to_pole_and_beyond(predicted):
                 assert float(row[z]) == pytest.approx(scenes.PLACE[2] + WIRE_Z, abs=0.15)
     between = next(row for row in conductors if row["span_id"] == held[0]["span_id"])
     assert float(between["sag"]) == pytest.approx(45**2 / (8 * 900), abs=0.05)
+
+
+def test_a_tower_that_was_missed_is_found_where_the_line_expects_it(line, model, wire_finder):
+    with predict_survey(line, [model, wire_finder], PredictSettings(), LONE_POLES) as whole:
+        [wires] = whole.further
+        search = WireSearch(wires.spool, wires.tiles, wires.used.card.threshold())
+        tau = whole.card.threshold()
+        towers = TowerSearch(whole.spool, whole.tiles, whole.unit_sizes, tau, LONE_POLES)
+        found = find_in_survey(towers)
+        _, missed, _ = sorted(found.towers, key=lambda tower: tower.x)
+        poor = found.without({missed.id})
+        again = find_line_in_survey(search, towers, poor)
+    measured = {tower.id: (tower.x, tower.y, tower.base, tower.height) for tower in found.towers}
+    for tower in again.towers.towers:
+        assert (tower.x, tower.y, tower.base, tower.height) == pytest.approx(measured[tower.id])
+    assert len(again.towers.towers) == len(found.towers) == 3
+    notes = [note for note in again.line.notes if note.what == FOUND_AGAIN]
+    assert [note.tower for note in notes] == [missed.id]
+    spans = {(span.from_tower, span.to_tower) for span in again.line.spans}
+    assert spans == {(span.from_tower, span.to_tower) for span in whole.line.spans}
+    assert FoundLine.from_json(again.to_json()).towers.towers == again.towers.towers
 
 
 def test_each_point_of_the_wire_has_its_span_and_no_other_point_has_one(predicted, line):

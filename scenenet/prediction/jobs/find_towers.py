@@ -7,7 +7,7 @@ from pathlib import Path
 
 from scenenet.core.files import atomic, write_json
 from scenenet.detection.settings import DetectionSettings
-from scenenet.prediction.found_towers import find_in_survey
+from scenenet.prediction.found_towers import TowerSearch, find_in_survey
 from scenenet.prediction.jobs.joined import joined_predictions, joined_work
 from scenenet.prediction.survey_files import SurveyFiles, result_name
 
@@ -39,8 +39,8 @@ def find_towers_of(
     tau = read_model(model)[1].threshold()
     joined = joined_work(survey, works)
     tiles = joined_predictions(joined, predictions)
-    label, sizes = f"{survey.name}: candidates measured", joined.system.unit_sizes
-    found = find_in_survey(joined.spool, tiles, sizes, tau, detection, label)
+    search = TowerSearch(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
+    found = find_in_survey(search, f"{survey.name}: candidates measured")
     write_json(towers, found.to_json())
     usable = {file.name for file in joined.files if file.error is None}
     with atomic(near) as folder:

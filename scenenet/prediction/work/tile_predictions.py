@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -81,14 +81,18 @@ class TilePredictions:
         return self._cached(code)
 
     def detected(
-        self, spool: TileSpool, threshold: float
+        self, spool: TileSpool, threshold: float, codes: Iterable[int] | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The voxels with probability >= ``threshold``: lattice positions (V, 3), probability (V,)
-        and shares (V, K), in a fixed order."""
+        and shares (V, K), in a fixed order.
+
+        Args:
+            codes: of the tiles to look at; None for all.
+        """
         zyx = [np.empty((0, 3), np.int64)]
         probability = [np.empty(0, np.float32)]
         shares = [np.empty((0, len(self.geneos)), np.float32)]
-        for code, _ in spool.places():
+        for code in (code for code, _ in spool.places()) if codes is None else sorted(codes):
             prediction = self.read(code)
             found = prediction.probability >= threshold
             if found.any():

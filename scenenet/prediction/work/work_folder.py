@@ -55,7 +55,7 @@ class WorkFolder:
 
     @property
     def line(self) -> Path:
-        """The lines (``SurveyLine``)."""
+        """The lines, and the towers with those that they asked for (``FoundLine``)."""
         return self.folder / "line.json"
 
     @property

@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
-from scenenet.detection.conductor_rules import FAR, WIDE, WIDEST_HEAD_M
-from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.geneo import kernel_named
+from scenenet.interpretability.doubts import Units, survey_doubts
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard
-from scenenet.pointcloud.units import METRE, SYMBOLS
+from scenenet.pointcloud.units import METRE
 
 NEGLIGIBLE = 0.01
 """Absolute share of a GENEO below which the explanation does not state its side."""
-
-WIDEST_ARM = WIDE * float(DetectionSettings.model_fields["crossarm"].default)
-"""Widest reach of crossarms from the axis, as a share of the height."""
-
-FEW_POINTS_PER_M = 5.0
-"""Own points per m of height below which the shape of a tower is hard to see. At 10 points per m2
-poles and pylons have 14 and more, at 2 points per m2 a pole has 1 to 5."""
 
 UNDETERMINED = "no meaning: the training crops do not determine it"
 """What stands in place of the meaning of a number that could as well have another value."""
@@ -59,10 +50,11 @@ class TowerExplanation:
 
 
 def explanations(
-    towers: Iterable[SurveyTower],
+    towers: Sequence[SurveyTower],
     card: ModelCard,
     unit_sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
     unit_names: tuple[str, str, str] = (METRE, METRE, METRE),
+    unheld: Collection[int] = (),
 ) -> list[TowerExplanation]:
     """An explanation of every tower of a survey, in the units of the survey.
 
@@ -70,36 +62,14 @@ def explanations(
 
     Args:
         unit_sizes, unit_names: sizes in m of the units of x, y and z, and their names.
+        unheld: as ``survey_doubts``.
     """
-    return [_explanation(tower, card, unit_sizes, unit_names) for tower in towers]
+    units = Units(*unit_sizes[1:], *unit_names[1:])
+    reasons = survey_doubts(towers, card.tau, unit_sizes, unit_names, unheld)
+    return [_explanation(t, own, units) for t, own in zip(towers, reasons, strict=True)]
 
 
-class _Units(NamedTuple):
-    """Sizes in m of the units in plan and of heights, and their names."""
-
-    planar_m: float
-    vertical_m: float
-    planar_name: str
-    vertical_name: str
-
-    @property
-    def planar(self) -> str:
-        """What follows a length in plan."""
-        return SYMBOLS.get(self.planar_name, self.planar_name)
-
-    @property
-    def vertical(self) -> str:
-        """What follows a height."""
-        return SYMBOLS.get(self.vertical_name, self.vertical_name)
-
-
-def _explanation(
-    tower: SurveyTower,
-    card: ModelCard,
-    unit_sizes: tuple[float, float, float],
-    unit_names: tuple[str, str, str],
-) -> TowerExplanation:
-    units = _Units(*unit_sizes[1:], *unit_names[1:])
+def _explanation(tower: SurveyTower, doubts: tuple[str, ...], units: Units) -> TowerExplanation:
     shares = sorted(tower.contributions.items(), key=lambda item: -abs(item[1]))
     return TowerExplanation(
         tower.id,
@@ -111,11 +81,11 @@ def _explanation(
         tower.probability,
         _evidence(tower, units),
         tuple((name, share, _sentence(share)) for name, share in shares),
-        doubts(tower, card.tau, unit_sizes, unit_names),
+        doubts,
     )
 
 
-def _evidence(tower: SurveyTower, units: _Units) -> tuple[str, ...]:
+def _evidence(tower: SurveyTower, units: Units) -> tuple[str, ...]:
     """The measurements of a tower, in words."""
     bearings = sorted(tower.conductor_bearings)
     conductors = "no conductors were found that leave it"
@@ -128,46 +98,6 @@ def _evidence(tower: SurveyTower, units: _Units) -> tuple[str, ...]:
         f"its body is {tower.width:.1f} {units.planar} wide where nothing touches it",
         conductors,
     )
-
-
-def doubts(
-    tower: SurveyTower,
-    tau: float | None,
-    unit_sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
-    unit_names: tuple[str, str, str] = (METRE, METRE, METRE),
-) -> tuple[str, ...]:
-    """Why a person should check a tower. A tower without any of these reasons is not doubtful.
-
-    Args:
-        tower: in the units of the survey.
-        tau: of the model; None if it is not known.
-        unit_sizes, unit_names: as ``explanations``.
-    """
-    units = _Units(*unit_sizes[1:], *unit_names[1:])
-    reasons = []
-    to_edge = tower.edge_distance * units.planar_m
-    height = tower.height * units.vertical_m
-    if to_edge < min(WIDEST_ARM * height, WIDEST_HEAD_M):
-        reasons.append(
-            f"it is {tower.edge_distance:.0f} {units.planar} from the edge of the data, nearer "
-            "than crossarms may reach: part of it may be missing"
-        )
-    if tower.conductor_directions == 0:
-        reasons.append("no conductors were found that leave it: a lone pole or tree looks alike")
-    if tower.conductor_directions == 1 and to_edge >= FAR:
-        reasons.append("conductors leave it in one direction only: the end of a line, or no tower")
-    if tower.points < FEW_POINTS_PER_M * height:
-        reasons.append(
-            f"it has {tower.points} points of its own, fewer than {FEW_POINTS_PER_M:.0f} per m of "
-            "its height: its shape is hard to see"
-        )
-    if tau is not None and tower.probability < tau:
-        reasons.append(
-            f"its probability is below tau, {tau:.3f}: its conductors and its body support it"
-        )
-    elif tau is not None and tower.probability < (1 + tau) / 2:
-        reasons.append(f"its probability is not far above tau, {tau:.3f}")
-    return tuple(reasons)
 
 
 def _sentence(share: float) -> str:

@@ -5,29 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from scenenet.core.errors import InputError
 from scenenet.detection.survey_tower import CONTRIBUTION, TOWER_COLUMNS, SurveyTower
-from scenenet.interpretability.explanations import doubts
+from scenenet.interpretability.doubts import doubt_rank, survey_doubts
 from scenenet.line.records import UNHELD
-from scenenet.pointcloud.units import SYMBOLS
 from scenenet.review.found_list import FoundList, ListedTower
-
-ENOUGH = 5
-"""Number of towers from which a height can be unusual among them."""
-
-UNUSUAL = 3.0
-"""Median absolute deviations, scaled to standard deviations, beyond which a height is unusual."""
-
-SCALE = 1.4826
-"""Standard deviation of normal values with a median absolute deviation of 1."""
-
-AS_USUAL = 0.3
-"""Share of the median by which any height may differ: spans over valleys and roads need it."""
-
-BESIDE_M = 10.0
-"""m between two towers below which they may be one."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +33,12 @@ def by_doubt(found: FoundList) -> list[Doubted]:
         InputError: the list lacks a column of the towers that ``scenenet predict`` writes.
     """
     towers = [_survey_tower(tower, found) for tower in found.towers]
-    own = [list(doubts(t, found.tau, found.unit_sizes, found.unit_names)) for t in towers]
-    others = (_unusual_heights(towers, found), _neighbours(towers, found), _without_line(found))
-    for more in others:
-        for reasons, reason in zip(own, more, strict=True):
-            reasons += reason
-    doubted = [Doubted(t, tuple(r)) for t, r in zip(found.towers, own, strict=True)]
-    return sorted(doubted, key=lambda each: (-len(each.reasons), each.tower.values["probability"]))
+    unheld = {note.tower for note in found.notes if note.what == UNHELD}
+    reasons = survey_doubts(towers, found.tau, found.unit_sizes, found.unit_names, unheld)
+    doubted = [Doubted(t, r) for t, r in zip(found.towers, reasons, strict=True)]
+    return sorted(
+        doubted, key=lambda each: doubt_rank(each.reasons, each.tower.values["probability"])
+    )
 
 
 def _survey_tower(tower: ListedTower, found: FoundList) -> SurveyTower:
@@ -79,46 +60,3 @@ def _survey_tower(tower: ListedTower, found: FoundList) -> SurveyTower:
             value = tuple(float(part) for part in value.split())
         values[column.name] = value
     return SurveyTower(**values)
-
-
-def _unusual_heights(towers: list[SurveyTower], found: FoundList) -> list[list[str]]:
-    """A reason for each tower that is much lower or taller than most of the survey."""
-    heights = np.array([tower.height for tower in towers])
-    if len(heights) < ENOUGH:
-        return [[] for _ in towers]
-    middle = float(np.median(heights))
-    usual = max(UNUSUAL * SCALE * float(np.median(np.abs(heights - middle))), AS_USUAL * middle)
-    unit = found.unit_names[2]
-    symbol = SYMBOLS.get(unit, unit)
-    return [
-        [
-            f"it is {height:.0f} {symbol} tall, and half of the towers of the survey are "
-            f"{'taller' if height < middle else 'lower'} than {middle:.0f} {symbol}"
-        ]
-        if abs(height - middle) > usual
-        else []
-        for height in heights
-    ]
-
-
-def _without_line(found: FoundList) -> list[list[str]]:
-    """A reason for each tower that no conductor leads to."""
-    unheld = {note.tower for note in found.notes if note.what == UNHELD}
-    reason = "no conductor that was traced leads to it"
-    return [[reason] if tower.id in unheld else [] for tower in found.towers]
-
-
-def _neighbours(towers: list[SurveyTower], found: FoundList) -> list[list[str]]:
-    """A reason for each tower that stands close to another one."""
-    from scipy.spatial import cKDTree
-
-    if len(towers) < 2:
-        return [[] for _ in towers]
-    places = found.places * found.unit_sizes[0]
-    apart, nearest = cKDTree(places).query(places, k=2)
-    return [
-        [f"it stands {distance:.1f} m beside tower {towers[other].id}: they may be one"]
-        if distance < BESIDE_M
-        else []
-        for distance, other in zip(apart[:, 1], nearest[:, 1], strict=True)
-    ]

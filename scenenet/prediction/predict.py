@@ -22,7 +22,8 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.targets import WIRE
-from scenenet.prediction.found_clearances import WireVoxels, find_clearances_in_survey
+from scenenet.prediction.area_points import WireVoxels
+from scenenet.prediction.found_clearances import find_clearances_in_survey
 from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_in_survey
 from scenenet.prediction.settings import PredictSettings

@@ -16,8 +16,9 @@ from fixtures.true_line import true_line
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.line.records import AS_FLOWN, SurveyLine
 from scenenet.pointcloud.class_schemes import EDP
+from scenenet.prediction.area_points import WireVoxels
 from scenenet.prediction.clearance_lists import write_clearance_layers, write_clearances_csv
-from scenenet.prediction.found_clearances import WireVoxels, find_clearances_in_survey
+from scenenet.prediction.found_clearances import find_clearances_in_survey
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
 from scenenet.prediction.work.structures import Structures
 from scenenet.prediction.work.tile_predictions import (

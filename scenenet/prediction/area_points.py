@@ -1,0 +1,129 @@
+"""The points of a survey in an area beside its lines, and what they belong to."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenenet.clearance.section import Area
+from scenenet.prediction.work.structures import Owners, Structures
+from scenenet.prediction.work.tile_predictions import TilePredictions
+from scenenet.prediction.work.tiling import TileSpool, groups
+
+KEPT_POINTS = 4_000_000
+"""Points in memory besides those of a section: neighbouring sections need the same tiles."""
+
+FREE, TOWER, WIRE = 0, 1, 2
+"""What a point belongs to: nothing, the structure of a tower, or a voxel of a wire."""
+
+
+class WireVoxels:
+    """The voxels that a model of wires is certain of."""
+
+    def __init__(self, spool: TileSpool, predictions: TilePredictions, tau: float) -> None:
+        """Read the predictions.
+
+        Args:
+            spool: the voxels that the model observes.
+            predictions: of the model, for all its tiles.
+            tau: of the model.
+        """
+        self._lattice = spool.lattice
+        self._sure: dict[int, np.ndarray] = {}
+        for code, _ in spool.places():
+            prediction = predictions.read(code)
+            sure = prediction.probability >= tau
+            if sure.any():
+                self._sure[code] = prediction.voxel[sure]
+
+    def have(self, xyz: np.ndarray) -> np.ndarray:
+        """(n,) bool: which points (n, 3) m are in them."""
+        inside = np.zeros(len(xyz), bool)
+        codes, voxels = self._lattice.locate(xyz)
+        for code, rows in groups(codes):
+            if code in self._sure:
+                inside[rows] = np.isin(voxels[rows], self._sure[code])
+        return inside
+
+
+@dataclass(frozen=True)
+class AreaPoints:
+    """Points.
+
+    Attributes:
+        xyz: (n, 3) m.
+        part: (n,) uint8, one of ``FREE``, ``TOWER`` and ``WIRE``.
+        codes: (n,) uint8 class codes; None where they are not known.
+    """
+
+    xyz: np.ndarray
+    part: np.ndarray
+    codes: np.ndarray | None
+
+    def at(self, rows: np.ndarray) -> AreaPoints:
+        """Those of a mask (n,) or of rows."""
+        codes = None if self.codes is None else self.codes[rows]
+        return AreaPoints(self.xyz[rows], self.part[rows], codes)
+
+
+class AreaLookUp:
+    """Gives the points of a survey in an area. Tiles that were used last stay in memory."""
+
+    def __init__(
+        self, spool: TileSpool, structures: Structures, wires: WireVoxels, *, classes: bool
+    ) -> None:
+        """Start with no tile in memory.
+
+        Args:
+            spool: the points of all files of the survey.
+            structures: the shapes of its towers.
+            wires: where the model of wires found them.
+            classes: whether ``spool`` has the class codes of the points.
+        """
+        self._spool, self._wires, self._classes = spool, wires, classes
+        self._columns = spool.columns()
+        self._owners = Owners(structures, spool.lattice)
+        self._kept: OrderedDict[int, AreaPoints] = OrderedDict()
+
+    def all(self, area: Area) -> AreaPoints:
+        """All points in an area, in a fixed order."""
+        (west, south), (east, north) = area.box()
+        parts = [AreaPoints(np.empty((0, 3)), np.empty(0, np.uint8), np.empty(0, np.uint8))]
+        for column in sorted(self._spool.lattice.columns((west, east), (south, north))):
+            for code in self._columns.get(column, ()):
+                tile = self._tile(code)
+                parts.append(tile.at(area.has(tile.xyz)))
+        codes = [part.codes for part in parts if part.codes is not None]
+        return AreaPoints(
+            np.concatenate([part.xyz for part in parts]),
+            np.concatenate([part.part for part in parts]),
+            np.concatenate(codes) if self._classes else None,
+        )
+
+    def free(self, area: Area) -> tuple[np.ndarray, np.ndarray | None]:
+        """The points in an area that belong to no tower or wire, with their class codes
+        (``scenenet.clearance.section.PointsIn``)."""
+        found = self.all(area)
+        free = found.at(found.part == FREE)
+        return free.xyz, free.codes
+
+    def _tile(self, code: int) -> AreaPoints:
+        if code not in self._kept:
+            codes = None
+            if self._classes:
+                xyz, codes = self._spool.classified_points(code)
+            else:
+                xyz = self._spool.points(code)
+            part = np.full(len(xyz), FREE, np.uint8)
+            part[self._wires.have(xyz)] = WIRE
+            part[self._owners(xyz, np.full(len(xyz), code)) > 0] = TOWER
+            self._kept[code] = AreaPoints(xyz, part, codes)
+            while len(self._kept) > 1 and self._held() > KEPT_POINTS:
+                self._kept.popitem(last=False)
+        self._kept.move_to_end(code)
+        return self._kept[code]
+
+    def _held(self) -> int:
+        return sum(len(tile.xyz) for tile in self._kept.values())

@@ -174,14 +174,18 @@ class Tracked:
         return comparison(self.address, runs[0].info.experiment_id, ids)
 
 
-def save(image: bytes, out: Path) -> None:
-    """Write a screenshot as a PNG with a palette, whole or not at all."""
+def save(image: bytes, out: Path, colours: int = COLOURS) -> None:
+    """Write a screenshot as a PNG with a palette, whole or not at all.
+
+    Args:
+        colours: in the palette.
+    """
     import io
 
     from PIL import Image
 
     picture = Image.open(io.BytesIO(image)).convert("RGB")
-    reduced = picture.quantize(COLOURS, dither=Image.Dither.NONE)
+    reduced = picture.quantize(colours, dither=Image.Dither.NONE)
     with atomic(out) as partial:
         reduced.save(partial, format="PNG", optimize=True)
 
@@ -200,6 +204,18 @@ def take_survey(survey: Path, out: Path) -> None:
         page.goto(survey.resolve().as_uri())
         page.get_by_role("button", name="Next").click()
         save(page.screenshot(), out / "survey.png")
+
+
+def take_spans(survey: Path, out: Path) -> None:
+    """The page of a survey with a line, with its longest span selected, light."""
+    with browsing(width=1400, height=1400) as page:
+        page.goto(survey.resolve().as_uri())
+        heading = page.locator("#spans thead button", has_text="length")
+        heading.dblclick()
+        page.locator("#spans tbody button").first.click()
+        page.locator("#spans tbody button").first.blur()
+        page.evaluate("scrollTo(0, 0)")
+        save(page.screenshot(), out / "spans.png", 256)
 
 
 def take_experiments(store: Tracked, out: Path) -> None:

@@ -1,7 +1,8 @@
-"""The picture of conductors in the documentation: ``python tools/line_pictures.py --wire W.json``.
+"""The pictures of conductors in the documentation: ``python tools/line_pictures.py --wire W.json``.
 
 Makes a synthetic line of pylons, finds its line with the model of the package and a model of wires,
-and draws the conductors over the points: ``docs/images/line.png``. With real recordings
+draws the conductors over the points, and opens the page of the survey in Chromium:
+``docs/images/line.png`` and ``spans.png``. With real recordings
 (``SCENENET_REAL_DATA``, or ``shared/data`` beside the project) it draws the Dutch corridor as well,
 into ``results/line``: nothing that comes from a recording is part of the project. A model of wires:
 ``scenenet train --target wire`` (docs/guides/targets.md).
@@ -20,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from doc_pictures import IMAGES, save
+from doc_pictures import IMAGES, chromium, save, take_spans
 
 from scenenet.core.errors import InputError
 from scenenet.figures.plots.style import COLOURS, DPI, TOWER_COLOUR, new_figure
@@ -45,6 +46,9 @@ PYLONS = {
     "high_strays": 0.02,
 }  # fmt: skip
 """Settings of the synthetic line."""
+
+VOLTAGE = 220.0
+"""kV, for the limits on the page of its survey."""
 
 MOST_POINTS = 60_000
 """Points of a panel, at most."""
@@ -183,8 +187,11 @@ def write(figure: Figure, out: Path) -> None:
     save(image.getvalue(), out)
 
 
-def find_line(survey: Path, wire: Path, crs: pyproj.CRS | None, folder: Path) -> FoundLine:
+def predict(
+    survey: Path, wire: Path, crs: pyproj.CRS | None, folder: Path, voltage: float | None = None
+) -> PredictionFiles:
     """Predict a survey with the model of the package and a model of wires."""
+    from scenenet.clearance.settings import ClearanceSettings
     from scenenet.detection.settings import DetectionSettings
     from scenenet.models.packaged import packaged_model
     from scenenet.prediction.settings import PredictSettings
@@ -194,18 +201,25 @@ def find_line(survey: Path, wire: Path, crs: pyproj.CRS | None, folder: Path) ->
     given = SurveyFiles.of(survey, crs)
     files = PredictionFiles.of(given, folder, line=True)
     models = [packaged_model(), wire]
-    predict_to_files(given, models, files, PredictSettings(), DetectionSettings())
-    return FoundLine.of(files)
+    clearance = ClearanceSettings(voltage=voltage)
+    predict_to_files(
+        given, models, files, PredictSettings(), DetectionSettings(), clearance=clearance
+    )
+    return files
 
 
 def take_synthetic(wire: Path, out: Path) -> None:
-    """The synthetic line."""
+    """The synthetic line, and the page of its survey."""
     from scenenet.synthetic import SyntheticSettings, make_survey
 
     with tempfile.TemporaryDirectory() as scratch:
         survey = Path(scratch) / "line.laz"
         make_survey(SyntheticSettings(**PYLONS), survey)
-        write(draw(find_line(survey, wire, None, Path(scratch) / "found")), out / "line.png")
+        files = predict(survey, wire, None, Path(scratch) / "found", VOLTAGE)
+        write(draw(FoundLine.of(files)), out / "line.png")
+        if chromium() is None or files.page is None:
+            raise InputError("there is no Chromium", remedy="apt install chromium")
+        take_spans(files.page, out)
 
 
 def take_real(wire: Path, out: Path) -> None:
@@ -213,8 +227,8 @@ def take_real(wire: Path, out: Path) -> None:
     import pyproj
 
     with tempfile.TemporaryDirectory() as scratch:
-        found = find_line(TILE, wire, pyproj.CRS(TILE_CRS), Path(scratch))
-        write(draw(found), out / f"{TILE.stem}.png")
+        files = predict(TILE, wire, pyproj.CRS(TILE_CRS), Path(scratch))
+        write(draw(FoundLine.of(files)), out / f"{TILE.stem}.png")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

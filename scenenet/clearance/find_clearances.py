@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,7 +20,7 @@ from scenenet.clearance.records import (
     SpanClearance,
     SurveyClearances,
 )
-from scenenet.clearance.section import BEYOND_M, SECTION_M, Area, PointsIn, measure
+from scenenet.clearance.section import BEYOND_M, Area, PointsIn, measure, sections
 from scenenet.clearance.settings import KINDS, WIRE, ClearanceLimits, ClearanceSettings
 from scenenet.clearance.trees import Trees
 from scenenet.core.progress import track
@@ -99,23 +98,23 @@ class _Finder:
         """What is near the conductors of a span."""
         own = [wire for wire in self._line.conductors if wire.span_id == span.span_id]
         frame = SpanFrame.between(np.array(span.start), np.array(span.end))
-        sections = [
+        measured = [
             measure(
                 area, own, self._others(area, span), self._points, self._scheme, self._limits,
                 self._settings,
             )
-            for area in self._areas(frame, own)
+            for area in sections(frame, own, self._settings.reach)
         ]  # fmt: skip
         nearest: dict[tuple[int, str], NearPoint] = {}
         steps: dict[tuple[int, str], NearPoint] = {}
-        for section in sections:
+        for section in measured:
             for point in section.near.nearest:
                 _keep(nearest, (point.conductor.conductor_id, point.kind), point)
             for number, point in section.near.steps:
                 _keep(steps, (number, point.kind), point)
         places = [self._place("nearest", point, 0) for point in nearest.values()]
-        places += self._dangers(TooNear.together([each.near.too_near for each in sections]), own)
-        trees = [tree for section in sections for tree in self._falling(section.trees, own)]
+        places += self._dangers(TooNear.together([each.near.too_near for each in measured]), own)
+        trees = [tree for section in measured for tree in self._falling(section.trees, own)]
         profile = [self._step(frame, span, *key, steps[key]) for key in sorted(steps)]
         return _FoundSpan(places, trees, profile)
 
@@ -143,17 +142,6 @@ class _Finder:
             fall_margin=min((tree.margin for tree in falling), default=None),
             kinds=self.kinds, limits=self.limits_named, positions=AS_FLOWN,
         )  # fmt: skip
-
-    def _areas(self, frame: SpanFrame, own: Sequence[Conductor]) -> list[Area]:
-        """The sections of a span, with what is beyond its ends."""
-        ends = np.array([end for wire in own for end in (wire.catenary.start, wire.catenary.end)])
-        across = np.abs(frame.to_frame(ends)[:, 1]).max()
-        n = max(int(np.ceil(frame.length / SECTION_M)), 1)
-        borders = np.linspace(0.0, frame.length, n + 1)
-        borders[0] -= BEYOND_M
-        borders[-1] += BEYOND_M
-        half_width = float(across) + self._settings.reach
-        return [Area(frame, first, last, half_width) for first, last in pairwise(borders.tolist())]
 
     def _others(self, area: Area, span: LineSpan) -> list[Conductor]:
         """Wires of other spans that may be in an area."""

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
-from scenenet.clearance.kinds import NO_OBSTACLE, surroundings
+from scenenet.clearance.kinds import NO_OBSTACLE, Surroundings, surroundings
 from scenenet.clearance.near_points import Near, near_points
 from scenenet.clearance.settings import ClearanceLimits, ClearanceSettings
 from scenenet.clearance.trees import Trees, find_trees
@@ -57,6 +58,25 @@ class Area:
         return (s >= self.first) & (s < self.last) & (np.abs(t) <= self.half_width)
 
 
+def sections(frame: SpanFrame, conductors: Sequence[Conductor], reach: float) -> list[Area]:
+    """The sections of a span, with what is beyond its ends.
+
+    Args:
+        conductors: of the span, at least one.
+        reach: m beside them.
+    """
+    ends = np.array(
+        [end for wire in conductors for end in (wire.catenary.start, wire.catenary.end)]
+    )
+    across = np.abs(frame.to_frame(ends)[:, 1]).max()
+    n = max(int(np.ceil(frame.length / SECTION_M)), 1)
+    borders = np.linspace(0.0, frame.length, n + 1)
+    borders[0] -= BEYOND_M
+    borders[-1] += BEYOND_M
+    half_width = float(across) + reach
+    return [Area(frame, first, last, half_width) for first, last in pairwise(borders.tolist())]
+
+
 PointsIn = Callable[[Area], tuple[np.ndarray, np.ndarray | None]]
 """Gives the points (n, 3) m of a survey in an area, in a fixed order, with their class codes (n,)
 uint8, or None where they are not known. Points of towers and stray returns may be left out."""
@@ -94,11 +114,7 @@ def measure(
         scheme: of their class codes; None where heights say what they are.
         limits: for the voltage; None without one.
     """
-    wide = Area(area.frame, area.first - AROUND_M, area.last + AROUND_M, area.half_width)
-    xyz, codes = points(wide)
-    free = ~_own(xyz, [*conductors, *others])
-    xyz, codes = xyz[free], None if codes is None else codes[free]
-    around = surroundings(xyz, codes, scheme, settings.few_points)
+    around = look_around(area, [*conductors, *others], points, scheme, settings.few_points)
     here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
     xyz, kind = around.xyz[here], around.kind[here]
     last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)
@@ -112,7 +128,28 @@ def measure(
     )
 
 
-def _own(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:
+def look_around(
+    area: Area,
+    wires: Sequence[Conductor],
+    points: PointsIn,
+    scheme: ClassScheme | None,
+    few_points: int,
+) -> Surroundings:
+    """What the points in a section and around it are, without those of wires.
+
+    Args:
+        wires: whose points are left out.
+        points, scheme: as ``measure``.
+        few_points: of ``ClearanceSettings``.
+    """
+    wide = Area(area.frame, area.first - AROUND_M, area.last + AROUND_M, area.half_width)
+    xyz, codes = points(wide)
+    free = ~on_wires(xyz, wires)
+    xyz, codes = xyz[free], None if codes is None else codes[free]
+    return surroundings(xyz, codes, scheme, few_points)
+
+
+def on_wires(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:
     """(n,) bool: which points (n, 3) m are those of wires."""
     own = np.zeros(len(xyz), bool)
     for conductor in conductors:

@@ -134,6 +134,7 @@ def predict_survey(
             line=line,
             clearance=clearance,
             clearances=clearances,
+            scheme=scheme if classes else None,
         )
 
 

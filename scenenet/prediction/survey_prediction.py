@@ -17,6 +17,7 @@ from scenenet.core.unchanged import FileState
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.line.records import SurveyLine
+from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.prediction.file_status import SurveyFile, readable
 from scenenet.prediction.found_towers import FoundTowers
 from scenenet.prediction.point_dimensions import TOWER_CODE
@@ -79,6 +80,7 @@ class SurveyPrediction:
             of wires.
         clearance: settings of ``clearances``; None for the defaults.
         clearances: what is near the lines, m; None if they were not looked for.
+        scheme: of the class codes that ``spool`` has of its points; None if it has none.
     """
 
     survey: SurveyFiles
@@ -98,6 +100,7 @@ class SurveyPrediction:
     line: SurveyLine | None = None
     clearance: ClearanceSettings | None = None
     clearances: SurveyClearances | None = None
+    scheme: ClassScheme | None = None
 
     @classmethod
     def of(
@@ -116,6 +119,7 @@ class SurveyPrediction:
         line: SurveyLine | None = None,
         clearance: ClearanceSettings | None = None,
         clearances: SurveyClearances | None = None,
+        scheme: ClassScheme | None = None,
     ) -> SurveyPrediction:
         """What was read, predicted and found."""
         return cls(
@@ -136,6 +140,7 @@ class SurveyPrediction:
             line=line,
             clearance=clearance,
             clearances=clearances,
+            scheme=scheme,
         )
 
     @property

@@ -4,74 +4,36 @@ from __future__ import annotations
 
 import csv
 import json
-from itertools import pairwise
+import shutil
 from pathlib import Path
 
 import laspy
 import line_pictures
 import numpy as np
 import pyogrio
-import pyproj
 import pytest
 from fixtures import scenes
-from fixtures.scenes import model_card
 
 from scenenet.detection.settings import DetectionSettings
-from scenenet.line.catenary import Catenary
 from scenenet.line.records import AS_FLOWN, FOUND_AGAIN
-from scenenet.models.factory import new_model
-from scenenet.models.model_file import write_model
-from scenenet.pointcloud import PointCloud, write_las
-from scenenet.pointcloud.targets import Target
 from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import TowerSearch, find_in_survey
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.writers import predict_to_files
-from scenenet.training.presets import preset
 
-WIRE_Z = 13.8
-POLES_X = (30.5, 75.5, 130.5)
 LONE_POLES = DetectionSettings(min_conductor=0)
 
 
 @pytest.fixture(scope="module")
-def wire_finder(tmp_path_factory) -> Path:
-    """A model of wires with numbers set by hand."""
-    path = tmp_path_factory.mktemp("wires") / "wires.json"
-    found = new_model(preset("scenenet", "operational", target=Target.parse("wire")), 0)
-    numbers = found.numbers()
-    numbers[-2:] = 0.7, 0.15  # of the mixture of the first observer: about a half and two quarters
-    found.set_numbers(numbers)
-    card = model_card(name="wires", target="wire", voxel_size=0.5, tau=0.2)
-    write_model(path, found, card)
-    return path
+def line(hung_line) -> Path:
+    return hung_line
 
 
 @pytest.fixture(scope="module")
-def line(scene, tmp_path_factory) -> Path:
-    """Three poles in a row, and a wire to the second one that ends before the third."""
-    poles = [(x, 15.5) for x in POLES_X]
-    cloud = scene(poles, size=(150.0, 31.0), tree=(100.0, 20.0))
-    x = np.arange(3.0, 103.0, 0.2)
-    z = np.empty_like(x)
-    for start, end in pairwise((POLES_X[0] - 45.0, *POLES_X)):
-        wire = Catenary((start, 15.5, WIRE_Z), (end, 15.5, WIRE_Z), 900.0)
-        own = (x >= start) & (x <= end)
-        z[own] = wire.height(x[own] - start)
-    places = np.column_stack([x, np.full(len(x), 15.5), z]) + scenes.PLACE
-    codes = np.append(cloud.classification, np.full(len(x), 16, np.uint8))
-    path = tmp_path_factory.mktemp("hung") / "line.laz"
-    write_las(path, PointCloud(np.concatenate([cloud.xyz, places]), codes, crs=pyproj.CRS(32629)))
-    return path
-
-
-@pytest.fixture(scope="module")
-def predicted(line, model, wire_finder, tmp_path_factory) -> PredictionFiles:
-    files = PredictionFiles.of(line, tmp_path_factory.mktemp("predicted"), line=True)
-    predict_to_files(line, [model, wire_finder], files, PredictSettings(), LONE_POLES)
-    return files
+def predicted(hung) -> PredictionFiles:
+    return hung
 
 
 def rows(path: Path) -> list[dict[str, str]]:
@@ -94,7 +56,7 @@ def test_the_conductor_is_traced_from_pole_to_pole_and_beyond(predicted):
         assert row["kind"] == "conductor"
         for tower, z in (("from_tower", "from_z"), ("to_tower", "to_z")):
             if row[tower] != "0":
-                assert float(row[z]) == pytest.approx(scenes.PLACE[2] + WIRE_Z, abs=0.15)
+                assert float(row[z]) == pytest.approx(scenes.PLACE[2] + scenes.WIRE_Z, abs=0.15)
     between = next(row for row in conductors if row["span_id"] == held[0]["span_id"])
     assert float(between["sag"]) == pytest.approx(45**2 / (8 * 900), abs=0.05)
 
@@ -161,11 +123,15 @@ def test_the_picture_draws_each_conductor_over_the_points(predicted):
     assert len(wires) == own
     heights = np.concatenate([drawn.get_ydata() for drawn in wires])
     deepest = 55**2 / (8 * 900)
-    assert (np.abs(heights + deepest / 2 - scenes.PLACE[2] - WIRE_Z) < deepest / 2 + 0.1).all()
+    assert (
+        np.abs(heights + deepest / 2 - scenes.PLACE[2] - scenes.WIRE_Z) < deepest / 2 + 0.1
+    ).all()
 
 
-def test_towers_alone_leave_no_outdated_line(predicted, line, model):
-    files = PredictionFiles.of(line, predicted.summary.parent)
+def test_towers_alone_leave_no_outdated_line(predicted, line, model, tmp_path):
+    files = PredictionFiles.of(line, shutil.copytree(predicted.summary.parent, tmp_path / "again"))
+    tables = [files.summary.with_name(path.name) for path in predicted.line_tables]
+    assert all(path.exists() for path in tables)
     predict_to_files(line, model, files, PredictSettings(), LONE_POLES)
-    assert not any(path.exists() for path in predicted.line_tables)
+    assert not any(path.exists() for path in tables)
     assert "spans" not in pyogrio.list_layers(files.geopackage)[:, 0]

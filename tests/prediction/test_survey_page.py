@@ -14,18 +14,23 @@ import pytest
 from scenenet.core.errors import InputError
 from scenenet.detection.settings import DetectionSettings
 from scenenet.prediction.file_status import LeftOut, SurveyFile
-from scenenet.prediction.page.map_shapes import MOST_CORNERS, MapFrame
-from scenenet.prediction.page.pictures import (
-    ALL_BYTES,
+from scenenet.prediction.page.budget import (
+    MOST_BYTES,
+    MOST_FILES,
     OTHER_POINTS,
     OWN_POINTS,
+    PICTURE_BYTES,
     POINT_BYTES,
-    STEP_M,
-    share_of_points,
-    thinned,
-    tower_pictures,
+    SPAN_POINTS,
+    PageBudget,
 )
-from scenenet.prediction.page.survey_page import LISTED, MOST_WARNINGS, not_seen, survey_page
+from scenenet.prediction.page.frame import MapFrame
+from scenenet.prediction.page.map_shapes import MOST_CORNERS
+from scenenet.prediction.page.pictures import TowerPicture, tower_pictures
+from scenenet.prediction.page.survey_facts import MOST_WARNINGS, not_seen
+from scenenet.prediction.page.survey_page import PageContent, survey_page
+from scenenet.prediction.page.thinning import STEP_M, quotas, thinned
+from scenenet.prediction.page.tower_list import LISTED
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
@@ -37,6 +42,13 @@ LONE_POLES = DetectionSettings(min_conductor=0)
 @pytest.fixture(scope="module")
 def page(line_page: Path) -> str:
     return line_page.read_text(encoding="utf-8")
+
+
+def page_of(prediction, pictures: bool = False) -> str:
+    """The page of a prediction, perhaps with the pictures of its towers."""
+    content = PageContent.of(prediction)
+    towers = [tower for tower, _ in content.towers] if pictures else []
+    return survey_page(prediction, content, tower_pictures(prediction, towers, content.budget))
 
 
 def data_of(page: str) -> dict:
@@ -86,9 +98,9 @@ def test_the_picture_of_a_tower_has_its_own_points_first(page):
 def test_names_of_files_cannot_become_markup(line_with_a_broken_file, model):
     folder = line_with_a_broken_file
     with predict_survey(folder, model, PredictSettings(), LONE_POLES) as prediction:
-        page = survey_page(prediction, tower_pictures(prediction))
+        page = page_of(prediction, pictures=True)
         left_out = replace(prediction.files[0], error=LeftOut("another system"))
-        more = survey_page(replace(prediction, files=(*prediction.files, left_out)), [])
+        more = page_of(replace(prediction, files=(*prediction.files, left_out)))
     assert "<img" not in page
     assert "&lt;img src=x onerror=alert(1)&gt; &amp; &#x27;quotes&quot;.laz" in page
     assert "not used: 1 of 3 files" in page
@@ -105,7 +117,7 @@ def test_equal_predictions_give_equal_pages(line, line_page, model, tmp_path):
 
 def test_a_survey_without_towers_has_a_page(line, model):
     with predict_survey(line, model, PredictSettings(), LONE_POLES) as prediction:
-        page = survey_page(replace(prediction, towers=()), [])
+        page = page_of(replace(prediction, towers=()))
     assert data_of(page)["towers"] == []
     assert "<dt>towers</dt><dd>0</dd>" in page
 
@@ -117,7 +129,7 @@ def test_what_is_wrong_with_many_files_is_said_once_and_briefly(line, model):
             replace(file, name=f"{i}.laz", warnings=("all have it", f"only {i} has it"))
             for i in range(30)
         ]
-        page = survey_page(replace(prediction, files=tuple(files)), [])
+        page = page_of(replace(prediction, files=tuple(files)))
     assert page.count("all have it (0.laz and 29 more files)") == 1
     assert page.count("has it (") == MOST_WARNINGS - 1
     assert f"{31 - MOST_WARNINGS} more warnings" in page
@@ -153,11 +165,55 @@ def test_thinned_points_are_as_many_as_asked_for_and_keep_thin_parts():
     assert len(thinned(np.zeros((50, 3)), 10)) == 1
 
 
-def test_more_towers_have_fewer_points_each():
-    assert share_of_points(0) == share_of_points(500) == 1
-    for n in (1000, 3000, 10_000):
-        each = share_of_points(n) * (OWN_POINTS + OTHER_POINTS)
-        assert n * each * POINT_BYTES == pytest.approx(ALL_BYTES)
+def test_those_to_check_come_first(page):
+    rows = re.findall(r'<tr data-tower="(\d+)" class="(\w+)"', page)
+    states = [state for _, state in rows]
+    assert states == sorted(states) and set(states) == {"check", "found"}
+    doubts = {tower["id"]: len(tower["doubts"]) for tower in data_of(page)["towers"]}
+    listed = [doubts[int(number)] for number, _ in rows]
+    assert listed == sorted(listed, reverse=True)
+
+
+def test_more_towers_and_spans_have_fewer_points_each():
+    assert PageBudget.of(0, 0).share == PageBudget.of(500, 0).share == 1
+    assert PageBudget.of(101, 100).share == 1
+    for n, spans in ((1000, 0), (4000, 0), (400, 399), (20_000, 0), (20_000, 19_000)):
+        of = PageBudget.of(n, spans)
+        full = of.towers * (OWN_POINTS + OTHER_POINTS) + of.spans * SPAN_POINTS
+        assert full * of.share * POINT_BYTES == pytest.approx(PICTURE_BYTES)
+        assert of.share > 0.1
+
+
+def test_what_one_kind_of_points_does_not_need_the_others_get():
+    assert quotas([5, 100, 0], [0.5, 0.25, 0.25], 50) == [5, 45, 0]
+    assert quotas([100, 100], [0.75, 0.25], 40) == [30, 10]
+    assert quotas([3, 4], [0.5, 0.5], 40) == [3, 4]
+    assert quotas([0, 0], [0.5, 0.5], 40) == [0, 0]
+
+
+def test_the_page_of_a_large_survey_is_bounded_and_says_what_it_leaves_out(line, model):
+    n = 6000
+    with predict_survey(line, model, PredictSettings(), LONE_POLES) as prediction:
+        first = prediction.towers[0]
+        [file] = prediction.files
+        large = replace(
+            prediction,
+            towers=tuple(replace(first, id=i + 1, x=first.x + 40 * i) for i in range(n)),
+            files=tuple(replace(file, name=f"{i}.laz") for i in range(n)),
+        )
+        content = PageContent.of(large)
+        points = content.budget.points(OWN_POINTS + OTHER_POINTS)
+        steps = np.full((points, 3), 12_345, "<i2")
+        drawn = (TowerPicture(tower.id, steps, 10) for tower, _ in content.towers)
+        page = survey_page(large, content, drawn)
+    listed = page.count("<tr data-tower=")
+    assert 3000 < listed < n
+    assert len(data_of(page)["towers"]) == page.count('id="points-') == listed
+    assert 0.7 * MOST_BYTES < len(page.encode()) < MOST_BYTES
+    assert f"the first {listed:,} of {n:,} towers".replace(",", "\u202f") in page
+    assert "pictures have fewer points" in page
+    assert page.count('<path class="file') == MOST_FILES
+    assert f"{n - MOST_FILES:,} more files".replace(",", "\u202f") in page
 
 
 def test_the_frame_of_a_map_is_in_whole_units_around_everything():
@@ -171,7 +227,7 @@ def test_the_frame_of_a_map_is_in_whole_units_around_everything():
 def test_a_file_without_points_is_not_on_the_map(line, model):
     with predict_survey(line, model, PredictSettings(), LONE_POLES) as prediction:
         empty = SurveyFile(Path("e.laz"), "e.laz", error=InputError("broken", file="e.laz"))
-        page = survey_page(replace(prediction, files=(*prediction.files, empty)), [])
+        page = page_of(replace(prediction, files=(*prediction.files, empty)))
     assert page.count('<path class="file') == 1
     assert "e.laz: broken" in page
     outline = re.search(r'<path class="coverage" d="([^"]*)"', page)[1]

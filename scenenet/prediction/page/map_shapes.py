@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,10 @@ import numpy as np
 
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.prediction.file_status import SurveyFile
+from scenenet.prediction.page.frame import MapFrame
+from scenenet.prediction.page.line_shapes import line_shapes
+from scenenet.prediction.page.span_facts import SpanFacts
+from scenenet.prediction.page.survey_facts import shown_files
 from scenenet.prediction.tower_lists import coverage
 
 if TYPE_CHECKING:
@@ -23,59 +26,38 @@ BEARING_M = 25.0
 """m, length of the strokes that show where conductors leave a tower."""
 
 
-@dataclass(frozen=True)
-class MapFrame:
-    """The part of the plane that a map shows.
-
-    SVG has y downwards and single precision, so its coordinates count from the north-west corner.
-
-    Attributes:
-        west, north: x and y of the corner, in the units of the survey.
-        width, height: in the same units.
-    """
-
-    west: float
-    north: float
-    width: float
-    height: float
-
-    @classmethod
-    def around(cls, boxes: Iterable[Sequence[float]]) -> MapFrame:
-        """The smallest frame in whole units around boxes (x, y, x, y), of which some may be NaN."""
-        corners = np.array([box for box in boxes if np.isfinite(box).all()]).reshape(-1, 4)
-        if not len(corners):
-            return cls(0.0, 1.0, 1.0, 1.0)
-        west, south = np.floor(corners[:, :2].min(axis=0)).tolist()
-        east, north = np.ceil(corners[:, 2:].max(axis=0)).tolist()
-        return cls(west, north, max(east - west, 1.0), max(north - south, 1.0))
-
-    def place(self, x: float, y: float) -> str:
-        """A place as text, in the coordinates of the map."""
-        return f"{x - self.west:.2f} {self.north - y:.2f}"
-
-    def ring(self, xy: np.ndarray) -> str:
-        """A closed ring (n, 2) as path data."""
-        return "M" + "L".join(self.place(*corner) for corner in xy[:-1].tolist()) + "Z"
-
-
-def frame_and_shapes(prediction: SurveyPrediction, doubtful: set[int]) -> tuple[MapFrame, str]:
-    """The frame of a survey, and its coverage, files and towers as SVG elements.
+def frame_and_shapes(
+    prediction: SurveyPrediction, doubtful: Mapping[int, bool], spans: Sequence[SpanFacts]
+) -> tuple[MapFrame, str]:
+    """The frame of a survey, and its coverage, files, line and towers as SVG elements.
 
     Args:
-        doubtful: ids of the towers to check.
+        doubtful: ids of the towers that the page lists -> whether they are to check.
+        spans: that the page lists.
     """
     import shapely
 
     planar = prediction.unit_sizes[0]
     area = shapely.transform(coverage(prediction.spool), lambda xy: xy / planar)
-    boxes = [file.extent for file in prediction.files if file.extent is not None]
+    files = [file for file in shown_files(prediction.files) if file.extent is not None]
+    boxes = [file.extent for file in files if file.extent is not None]
     places = [(t.x, t.y, t.x, t.y) for t in prediction.towers]
+    line = prediction.line
+    ends = () if line is None else (end for span in line.spans for end in (span.start, span.end))
+    places += [(x / planar, y / planar, x / planar, y / planar) for x, y in ends]
     frame = MapFrame.around([shapely.bounds(area).tolist(), *boxes, *places])
+    of_line = []
+    if line is not None:
+        of_line = line_shapes(line, spans, prediction.clearances, frame, planar)
+    listed = [tower for tower in prediction.towers if tower.id in doubtful]
+    others = [tower for tower in prediction.towers if tower.id not in doubtful]
     shapes = [
         f'<path class="coverage" d="{_outline(area, frame)}"/>',
-        *(_file(file, frame) for file in prediction.files if file.extent is not None),
-        f'<path class="bearings" d="{_bearings(prediction.towers, frame, planar)}"/>',
-        *(_marker(tower, tower.id in doubtful, frame) for tower in prediction.towers),
+        *(_file(file, frame) for file in files),
+        f'<path class="bearings" d="{_bearings(listed, frame, planar)}"/>',
+        *of_line,
+        f'<path class="unlisted" d="{_dots(others, frame)}"/>' if others else "",
+        *(_marker(tower, doubtful[tower.id], frame) for tower in listed),
     ]
     return frame, "\n".join(shapes)
 
@@ -116,3 +98,7 @@ def _marker(tower: SurveyTower, doubtful: bool, frame: MapFrame) -> str:
     kind = "tower check" if doubtful else "tower"
     place = frame.place(tower.x, tower.y)
     return f'<path class="{kind}" data-tower="{tower.id}" d="M{place}h0"/>'
+
+
+def _dots(towers: Iterable[SurveyTower], frame: MapFrame) -> str:
+    return "".join(f"M{frame.place(tower.x, tower.y)}h0" for tower in towers)

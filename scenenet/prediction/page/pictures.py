@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,31 +11,15 @@ import numpy as np
 
 from scenenet.core.progress import track
 from scenenet.detection.survey_tower import SurveyTower
+from scenenet.prediction.page.budget import OTHER_POINTS, OWN_POINTS, PageBudget
+from scenenet.prediction.page.thinning import STEP_M, thinned
 from scenenet.prediction.surroundings import survey_points
 
 if TYPE_CHECKING:
     from scenenet.prediction.survey_prediction import SurveyPrediction
 
-STEP_M = 0.01
-"""m, step of the coordinates in a picture. A pixel is wider."""
-
-OWN_POINTS, OTHER_POINTS = 1200, 1800
-"""Most points of a tower and of its surroundings in a picture."""
-
-FEWEST = 1 / 20
-"""Smallest share of these numbers, however many towers a survey has."""
-
-POINT_BYTES = 8
-"""Bytes of a point in the page: three numbers of two bytes as base64."""
-
-ALL_BYTES = 13_000_000
-"""Bytes of all pictures of a page. With more towers each has fewer points."""
-
 RADIUS_M = 15.0, 80.0
 """m, smallest and largest radius of a picture. Between them it is the height of the tower."""
-
-FINER = 1.2
-"""Ratio of successive cell sizes when points are thinned."""
 
 
 @dataclass(frozen=True)
@@ -65,12 +49,14 @@ class TowerPicture:
         return base64.b64encode(self.steps.tobytes()).decode("ascii")
 
 
-def tower_pictures(prediction: SurveyPrediction) -> Iterator[TowerPicture]:
-    """The picture of each tower of a prediction, in the order of its list."""
+def tower_pictures(
+    prediction: SurveyPrediction, towers: Sequence[SurveyTower], budget: PageBudget
+) -> Iterator[TowerPicture]:
+    """Pictures of towers of a prediction, in their order."""
     points = survey_points(prediction.spool)
-    share = share_of_points(len(prediction.towers))
-    most_own, most_others = (max(1, int(share * n)) for n in (OWN_POINTS, OTHER_POINTS))
-    for tower in track(_in_metres(prediction), "pictures of towers", total=len(prediction.towers)):
+    most_own, most_others = budget.points(OWN_POINTS), budget.points(OTHER_POINTS)
+    known = _in_metres(towers, prediction.unit_sizes)
+    for tower in track(known, "pictures of towers", total=len(towers)):
         foot = np.array([tower.x, tower.y, tower.base])
         radius = radius_of(tower.height)
         near = points(foot[:2], radius)
@@ -87,43 +73,8 @@ def radius_of(height: float) -> float:
     return float(np.clip(height, *RADIUS_M))
 
 
-def share_of_points(n_towers: int) -> float:
-    """Share of ``OWN_POINTS`` and ``OTHER_POINTS`` in each picture of a survey."""
-    full = max(n_towers, 1) * (OWN_POINTS + OTHER_POINTS) * POINT_BYTES
-    return max(FEWEST, min(1.0, ALL_BYTES / full))
-
-
-def thinned(xyz: np.ndarray, most: int) -> np.ndarray:
-    """At most ``most`` of the points (n, 3) m, one for each cell of a size that gives so many.
-
-    Thin parts such as conductors keep their points, because a cell counts once, however many points
-    are in it. Equal points in equal order give the same result.
-    """
-    if len(xyz) <= most:
-        return xyz
-    # Not the lowest point of each cell: trees would look like shelves.
-    xyz = np.random.default_rng(0).permutation(xyz)
-    offsets = xyz - xyz.min(axis=0)
-    # Points lie on surfaces: about as many cells as points of the result cover the widest one.
-    cell = max(STEP_M, float(np.sqrt(np.prod(np.sort(offsets.max(axis=0))[1:]) / most)) / 4)
-    kept = _one_each(offsets, cell)
-    while len(kept) > most:
-        # The size is found with the points that are left: they are few.
-        few = offsets[kept]
-        while len(few) > most:
-            cell *= FINER
-            few = few[_one_each(few, cell)]
-        kept = _one_each(offsets, cell)
-    return xyz[kept]
-
-
-def _one_each(offsets: np.ndarray, cell: float) -> np.ndarray:
-    """Rows of the first of the points (n, 3) m in each cell, ascending; no offset is negative."""
-    steps = np.floor(offsets / cell).astype(np.int64)
-    code = (steps[:, 0] << 42) | (steps[:, 1] << 21) | steps[:, 2]
-    return np.sort(np.unique(code, return_index=True)[1])
-
-
-def _in_metres(prediction: SurveyPrediction) -> Iterable[SurveyTower]:
-    planar, _, vertical = prediction.unit_sizes
-    return (t.in_units((1 / planar, 1 / planar, 1 / vertical)) for t in prediction.towers)
+def _in_metres(
+    towers: Iterable[SurveyTower], unit_sizes: tuple[float, float, float]
+) -> Iterable[SurveyTower]:
+    planar, _, vertical = unit_sizes
+    return (t.in_units((1 / planar, 1 / planar, 1 / vertical)) for t in towers)

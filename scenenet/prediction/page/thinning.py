@@ -1,0 +1,67 @@
+"""Fewer points that look the same."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+STEP_M = 0.01
+"""m, step of the coordinates in a picture. A pixel is wider."""
+
+FINER = 1.2
+"""Ratio of successive cell sizes when points are thinned."""
+
+
+def thinned(xyz: np.ndarray, most: int) -> np.ndarray:
+    """At most ``most`` of the points (n, 3) m, one for each cell of a size that gives so many.
+
+    Thin parts such as conductors keep their points, because a cell counts once, however many points
+    are in it. Equal points in equal order give the same result.
+    """
+    if len(xyz) <= most:
+        return xyz
+    # Not the lowest point of each cell: trees would look like shelves.
+    xyz = np.random.default_rng(0).permutation(xyz)
+    offsets = xyz - xyz.min(axis=0)
+    # Points lie on surfaces: about as many cells as points of the result cover the widest one.
+    cell = max(STEP_M, float(np.sqrt(np.prod(np.sort(offsets.max(axis=0))[1:]) / most)) / 4)
+    kept = _one_each(offsets, cell)
+    while len(kept) > most:
+        # The size is found with the points that are left: they are few.
+        few = offsets[kept]
+        while len(few) > most:
+            cell *= FINER
+            few = few[_one_each(few, cell)]
+        kept = _one_each(offsets, cell)
+    return xyz[kept]
+
+
+def _one_each(offsets: np.ndarray, cell: float) -> np.ndarray:
+    """Rows of the first of the points (n, 3) m in each cell, ascending; no offset is negative."""
+    steps = np.floor(offsets / cell).astype(np.int64)
+    code = (steps[:, 0] << 42) | (steps[:, 1] << 21) | steps[:, 2]
+    return np.sort(np.unique(code, return_index=True)[1])
+
+
+def quotas(counts: Sequence[int], weights: Sequence[float], most: int) -> list[int]:
+    """How many of each of several groups of points are kept, ``most`` in all.
+
+    Args:
+        counts: number of points in each group.
+        weights: share of each group where all have more; what one does not need, the others get.
+    """
+    kept = [0] * len(counts)
+    left, open_groups = most, [n for n in range(len(counts)) if counts[n]]
+    while open_groups and left > 0:
+        total = sum(weights[n] for n in open_groups)
+        small = [n for n in open_groups if counts[n] <= left * weights[n] / total]
+        if not small:
+            for n in open_groups:
+                kept[n] = int(left * weights[n] / total)
+            break
+        for n in small:
+            kept[n] = counts[n]
+            left -= counts[n]
+        open_groups = [n for n in open_groups if n not in small]
+    return kept

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from scenenet.detection.conductor_rules import FAR, WIDE, WIDEST_HEAD_M
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
+from scenenet.line.records import FOUND_AGAIN, UNHELD, LineNote
 from scenenet.pointcloud.units import METRE, SYMBOLS
 
 WIDEST_ARM = WIDE * float(DetectionSettings.model_fields["crossarm"].default)
@@ -33,6 +34,12 @@ AS_USUAL = 0.3
 
 BESIDE_M = 10.0
 """m between two towers below which they may be one."""
+
+BY_LINE = {
+    UNHELD: "no conductor that was traced leads to it",
+    FOUND_AGAIN: "it was found only when it was looked for where the line expects a tower",
+}
+"""What a note of the line says about a tower -> the reason to check it."""
 
 
 class Units(NamedTuple):
@@ -99,24 +106,24 @@ def survey_doubts(
     tau: float | None,
     unit_sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
     unit_names: tuple[str, str, str] = (METRE, METRE, METRE),
-    unheld: Collection[int] = (),
+    notes: Iterable[LineNote] = (),
 ) -> list[tuple[str, ...]]:
     """Of each tower of a survey, why a person should check it: ``doubts``, and what the other
     towers and the line say about it.
 
     Args:
         towers, tau, unit_sizes, unit_names: as ``doubts``.
-        unheld: ids of towers that no conductor leads to; none where no line was looked for.
+        notes: of the line; none where no line was looked for.
     """
     units = Units(*unit_sizes[1:], *unit_names[1:])
     heights, neighbours = _unusual_heights(towers, units), _neighbours(towers, units.planar_m)
-    reason = "no conductor that was traced leads to it"
+    of_line = {note.tower: BY_LINE[note.what] for note in notes if note.what in BY_LINE}
     return [
         (
             *doubts(tower, tau, unit_sizes, unit_names),
             *height,
             *neighbour,
-            *([reason] if tower.id in unheld else []),
+            *([of_line[tower.id]] if tower.id in of_line else []),
         )
         for tower, height, neighbour in zip(towers, heights, neighbours, strict=True)
     ]

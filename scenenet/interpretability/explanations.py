@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.geneo import kernel_named
 from scenenet.interpretability.doubts import Units, survey_doubts
+from scenenet.line.records import LineNote
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
@@ -54,7 +55,7 @@ def explanations(
     card: ModelCard,
     unit_sizes: tuple[float, float, float] = (1.0, 1.0, 1.0),
     unit_names: tuple[str, str, str] = (METRE, METRE, METRE),
-    unheld: Collection[int] = (),
+    notes: Iterable[LineNote] = (),
 ) -> list[TowerExplanation]:
     """An explanation of every tower of a survey, in the units of the survey.
 
@@ -62,10 +63,10 @@ def explanations(
 
     Args:
         unit_sizes, unit_names: sizes in m of the units of x, y and z, and their names.
-        unheld: as ``survey_doubts``.
+        notes: as ``survey_doubts``.
     """
     units = Units(*unit_sizes[1:], *unit_names[1:])
-    reasons = survey_doubts(towers, card.tau, unit_sizes, unit_names, unheld)
+    reasons = survey_doubts(towers, card.tau, unit_sizes, unit_names, notes)
     return [_explanation(t, own, units) for t, own in zip(towers, reasons, strict=True)]
 
 

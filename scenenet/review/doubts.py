@@ -8,7 +8,6 @@ from typing import Any
 from scenenet.core.errors import InputError
 from scenenet.detection.survey_tower import CONTRIBUTION, TOWER_COLUMNS, SurveyTower
 from scenenet.interpretability.doubts import doubt_rank, survey_doubts
-from scenenet.line.records import UNHELD
 from scenenet.review.found_list import FoundList, ListedTower
 
 
@@ -33,8 +32,7 @@ def by_doubt(found: FoundList) -> list[Doubted]:
         InputError: the list lacks a column of the towers that ``scenenet predict`` writes.
     """
     towers = [_survey_tower(tower, found) for tower in found.towers]
-    unheld = {note.tower for note in found.notes if note.what == UNHELD}
-    reasons = survey_doubts(towers, found.tau, found.unit_sizes, found.unit_names, unheld)
+    reasons = survey_doubts(towers, found.tau, found.unit_sizes, found.unit_names, found.notes)
     doubted = [Doubted(t, r) for t, r in zip(found.towers, reasons, strict=True)]
     return sorted(
         doubted, key=lambda each: doubt_rank(each.reasons, each.tower.values["probability"])

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from scenenet.clearance.records import SurveyClearances
-from scenenet.line.records import EXPECTED, UNHELD, Conductor, SurveyLine
+from scenenet.line.records import EXPECTED, FOUND_AGAIN, UNHELD, Conductor, SurveyLine
 from scenenet.prediction.page.budget import MOST_MARKS
 from scenenet.prediction.page.frame import MapFrame
 from scenenet.prediction.page.span_facts import SpanFacts
@@ -17,6 +17,9 @@ BLOWN_M = 0.05
 
 BENDS = 8
 """Pieces of such a curve."""
+
+RINGS = "expected", "again", "unheld"
+"""Marks that are rings."""
 
 KINDS = {"conductor": "wire", "earth wire": "wire earth", "cable": "wire cable"}
 """Kind of a wire -> class of its path."""
@@ -56,6 +59,7 @@ def line_shapes(
         ("danger", dangers),
         ("outside", free),
         ("expected", [(n.x, n.y) for n in line.notes if n.what == EXPECTED]),
+        ("again", [(n.x, n.y) for n in line.notes if n.what == FOUND_AGAIN]),
         ("unheld", [(n.x, n.y) for n in line.notes if n.what == UNHELD]),
     ):
         shapes += _marks(name, places, frame, planar)
@@ -84,5 +88,5 @@ def _marks(
     if not places:
         return []
     path = "".join(f"M{frame.place(x / planar, y / planar)}h0" for x, y in places)
-    ring = [f'<path class="{name} ring" d="{path}"/>'] if name in ("expected", "unheld") else []
+    ring = [f'<path class="{name} ring" d="{path}"/>'] if name in RINGS else []
     return [*ring, f'<path class="{name}" d="{path}"/>']

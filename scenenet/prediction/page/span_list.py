@@ -47,8 +47,6 @@ def span_headings(units: LengthUnits) -> str:
         ("span", "number that follows from its place, unique in the survey", "number"),
         ("state", "too near: a place closer than the limit; to check: a reason to doubt it",
          "text"),
-        ("line", "number of the line that it belongs to; 0 for cables of no line", "number"),
-        ("order", "its place along the line, from 1", "number"),
         ("worst", "kind with the smallest margin, or without limits the smallest distance",
          "text"),
         (f"distance{unit}", "of the worst, from the conductor in space", "number"),
@@ -57,6 +55,8 @@ def span_headings(units: LengthUnits) -> str:
         ("trees", "trees that could fall on its conductors", "number"),
         (f"worst RMSE{unit}", "largest RMSE of its conductors", "number"),
         ("conductors", "conductors, without earth wires", "number"),
+        ("line", "number of the line that it belongs to; 0 for cables of no line", "number"),
+        ("order", "its place along the line, from 1", "number"),
         (f"length{unit}", "horizontal distance between its ends", "number"),
         ("ends", "what is known of its ends, where they are not at towers", "text"),
     ])  # fmt: skip
@@ -72,8 +72,6 @@ def _row(facts: SpanFacts, units: LengthUnits) -> str:
     size = units.planar_m
     margin = None if worst is None else worst.margin
     cells = [
-        (str(span.line), "number"),
-        (str(span.order), "number"),
         ("" if worst is None else worst.kind, "text"),
         ("" if worst is None else f"{worst.distance / size:.2f}", "number"),
         ("" if margin is None else f"{margin / size:.2f}", "number"),
@@ -81,6 +79,8 @@ def _row(facts: SpanFacts, units: LengthUnits) -> str:
         (str(len(facts.trees)), "number"),
         (f"{span.worst_rmse / size:.3f}", "number"),
         (str(span.conductors), "number"),
+        (str(span.line), "number"),
+        (str(span.order), "number"),
         (f"{span.length / size:.1f}", "number"),
         ("" if span.ends == BETWEEN else span.ends, "text"),
     ]

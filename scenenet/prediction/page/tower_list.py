@@ -9,7 +9,6 @@ from scenenet.core.columns import FieldColumn
 from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower
 from scenenet.interpretability.doubts import doubt_rank
 from scenenet.interpretability.explanations import TowerExplanation, explanations
-from scenenet.line.records import UNHELD
 from scenenet.prediction.page.markup import headings, row
 from scenenet.prediction.page.pictures import TowerPicture, radius_of
 
@@ -34,9 +33,8 @@ def to_check_first(prediction: SurveyPrediction) -> list[Explained]:
     list."""
     notes = () if prediction.line is None else prediction.line.notes
     explained = explanations(
-        prediction.towers, prediction.card, prediction.unit_sizes, prediction.unit_names,
-        {note.tower for note in notes if note.what == UNHELD},
-    )  # fmt: skip
+        prediction.towers, prediction.card, prediction.unit_sizes, prediction.unit_names, notes
+    )
     both = zip(prediction.towers, explained, strict=True)
     return sorted(
         both,

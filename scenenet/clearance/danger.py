@@ -9,8 +9,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from scenenet.clearance.near_points import POINT_KINDS, TooNear
-
 CELL_M = 1.0
 """m, edge of the cells in plan that are joined to places."""
 
@@ -19,15 +17,16 @@ JOINED_M = 2.9
 diagonal, lies between them."""
 
 
-def places(too_near: TooNear) -> Iterator[np.ndarray]:
-    """Rows (m,) of the points of each place; a place has points of one kind."""
-    for number in range(len(POINT_KINDS)):
-        rows = np.flatnonzero(too_near.kind == number)
-        if not len(rows):
-            continue
-        cells, cell = np.unique(
-            np.floor(too_near.xyz[rows, :2] / CELL_M), axis=0, return_inverse=True
-        )
+def places(xyz: np.ndarray, kind: np.ndarray) -> Iterator[np.ndarray]:
+    """Rows (m,) of the points of each place; a place has points of one kind.
+
+    Args:
+        xyz: (n, 3) m, of the points.
+        kind: (n,) integers.
+    """
+    for number in np.unique(kind):
+        rows = np.flatnonzero(kind == number)
+        cells, cell = np.unique(np.floor(xyz[rows, :2] / CELL_M), axis=0, return_inverse=True)
         pairs = cKDTree(cells * CELL_M).query_pairs(JOINED_M, output_type="ndarray")
         links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(cells),) * 2)
         n, place = connected_components(links, directed=False)

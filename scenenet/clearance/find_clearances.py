@@ -154,7 +154,7 @@ class _Finder:
     def _dangers(self, too_near: TooNear, own: Sequence[Conductor]) -> list[Clearance]:
         wires = {wire.conductor_id: wire for wire in own}
         found = []
-        for rows in danger.places(too_near):
+        for rows in danger.places(too_near.xyz, too_near.kind):
             worst = rows[np.argmin(too_near.distance[rows])]
             point = NearPoint(
                 wires[int(too_near.conductor[worst])], POINT_KINDS[too_near.kind[worst]],

@@ -29,9 +29,9 @@ from scenenet.synthetic.scene.random_fields import Raster, stream
 from scenenet.synthetic.scene.strip import Strip
 from scenenet.synthetic.scene.terrain import Terrain
 from scenenet.synthetic.scene.towers import place, sample
-from scenenet.synthetic.scene.vegetation import WIDEST_CROWN_M, Vegetation, keep_clear
+from scenenet.synthetic.scene.vegetation import WIDEST_CROWN_M, Plants, Vegetation, keep_clear
 from scenenet.synthetic.settings import SyntheticSettings
-from scenenet.synthetic.truth import TrueConductor, TrueTower
+from scenenet.synthetic.truth import TrueConductor, TrueTower, TrueTree
 
 Coded = tuple[np.ndarray, np.ndarray]
 """Points (N, 3) and their codes (N,)."""
@@ -117,6 +117,21 @@ class Corridor:
                 )
         return found
 
+    @property
+    def trees(self) -> list[TrueTree]:
+        """The true trees, stretch by stretch; without bushes, hedges and dead trees."""
+        found = []
+        for strip in (strip for number in range(len(self)) for strip in self.line.strips(number)):
+            trees = self._trees(strip, strip.bounds())
+            inside = strip.holds(trees.x, trees.y)
+            base = self.terrain.height(trees.x, trees.y)
+            own = zip(trees.x, trees.y, base, trees.height, trees.radius, strict=True)
+            for (x, y, ground, height, radius), in_strip in zip(own, inside, strict=True):
+                if in_strip:
+                    east, north = x + self._origin[0], y + self._origin[1]
+                    found.append(TrueTree(*map(float, (east, north, ground, height, radius))))
+        return found
+
     def __iter__(self) -> Iterator[Stretch]:
         for index in range(len(self)):
             yield self.stretch(index)
@@ -187,9 +202,7 @@ class Corridor:
         settings = self.settings
         bounds = strip.bounds(reach=WIDEST_CROWN_M)
         terrain = self.terrain.raster(bounds)
-        trees = self._vegetation.trees(bounds)
-        across = strip.to_strip(trees.x, trees.y)[1]
-        trees = keep_clear(trees, np.abs(across), settings.clearing)
+        trees = self._trees(strip, bounds)
         canopy = self._vegetation.canopy(bounds, trees)
         solid = Raster.covering(bounds, canopy.top.step)
         clutter = clutter_points(strip, terrain, solid, flight, settings, rng)
@@ -206,6 +219,12 @@ class Corridor:
             conductor_points(strip, before, after, span, flight, settings, rng),
             other_cables(strip, terrain, flight, settings, rng),
         ]
+
+    def _trees(self, strip: Strip, bounds: tuple[float, float, float, float]) -> Plants:
+        """Trees with stems within bounds (``Vegetation.trees``) that keep clear of the line."""
+        trees = self._vegetation.trees(bounds)
+        across = strip.to_strip(trees.x, trees.y)[1]
+        return keep_clear(trees, np.abs(across), self.settings.clearing)
 
     def _tower_points(self, tower: Support, flight: Flight, rng: np.random.Generator) -> Coded:
         settings = self.settings

@@ -28,6 +28,24 @@ class TrueTower:
 
 
 @dataclass(frozen=True)
+class TrueTree:
+    """A tree of the corridor.
+
+    Attributes:
+        x, y: stem, m, in the survey's CRS.
+        base: elevation of the ground at the stem, m.
+        height: m.
+        radius: of its crown, m.
+    """
+
+    x: float
+    y: float
+    base: float
+    height: float
+    radius: float
+
+
+@dataclass(frozen=True)
 class TrueConductor:
     """A conductor or an earth wire of one span.
 

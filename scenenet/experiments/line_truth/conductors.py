@@ -1,34 +1,16 @@
-"""The conductors and spans that are found in synthetic surveys, against the truth.
-
-    python -m scenenet.experiments.line_truth --model WIRES [--towers 24] [--seed 5] [--kinds ...]
-
-makes a survey for each kind of tower, finds its towers with the model of the package and its wires
-with WIRES, and compares every conductor with the one that hangs there. Prints a Markdown table.
-"""
+"""The conductors and spans that are found in synthetic surveys, against the true ones."""
 
 from __future__ import annotations
 
-import argparse
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
-from typing import Any, get_args
 
 import numpy as np
 
-from scenenet.core.errors import InputError
-from scenenet.core.scratch import scratch_folder
-from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.line.records import Conductor, SurveyLine
-from scenenet.models.packaged import packaged_model
-from scenenet.prediction.predict import predict_survey
-from scenenet.prediction.settings import PredictSettings
 from scenenet.synthetic.corridor import Corridor
-from scenenet.synthetic.settings import Kind, SyntheticSettings
-from scenenet.synthetic.survey import make_survey
 from scenenet.synthetic.truth import TrueConductor
 
 SAME_M = 0.3
@@ -36,17 +18,6 @@ SAME_M = 0.3
 
 AT_TOWER_M = 5.0
 """m, distance up to which a tower is the true one (docs/reference/glossary.md)."""
-
-POLES: Mapping[str, Any] = {"density": 20.0}
-PYLONS: Mapping[str, Any] = {
-    "height": (22, 40), "span": 310, "span_spread": 30, "half_width": 40, "circuits": 2,
-    "earth_wires": 1, "bundle": 2, "catenary": 1600, "clearing": 6, "relief": 60, "density": 12,
-    "tower_density": 18, "flight_height": (90, 130), "high_strays": 0.02,
-}  # fmt: skip
-"""Settings of lines of poles and of pylons, as in docs/method/synthetic.md."""
-
-SETTINGS: Mapping[str, Mapping[str, Any]] = {"lattice": PYLONS, "window": PYLONS}
-"""Settings of the line by the kind of its towers; others are ``POLES``."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +61,7 @@ def compare(
     true = corridor.conductors
     inner = [c for c in true if c.from_tower and c.to_tower]
     held = [c for c in line.conductors if c.kind != "cable"]
-    pairs = [(t, _nearest(t, held)) for t in inner]
+    pairs = [(t, true_one(t, held)) for t in inner]
     own = [(t, c) for t, c in pairs if c is not None]
     sag, parameter, attachment = [], [], []
     for t, c in own:
@@ -125,7 +96,7 @@ def compare(
     )
 
 
-def _nearest(true: TrueConductor, found: Sequence[Conductor]) -> Conductor | None:
+def true_one(true: TrueConductor, found: Sequence[Conductor]) -> Conductor | None:
     """The conductor that is the true one; None if there is none."""
     apart = [(_median_distance(true, c), n) for n, c in enumerate(found)]
     distance, number = min(apart, default=(np.inf, -1))
@@ -153,22 +124,6 @@ def _true_towers(corridor: Corridor, towers: Sequence[SurveyTower]) -> dict[int,
     return names
 
 
-def run(kind: str, towers: int, seed: int, wires: Path, folder: Path) -> Comparison:
-    """Make the survey of a kind of tower, predict it, and compare.
-
-    Raises:
-        InputError: the model cannot be used.
-    """
-    own = {**SETTINGS.get(kind, POLES), "kinds": {kind: 1.0}, "section": 0, "margin": 30.0}
-    settings = SyntheticSettings(**own, towers=towers, seed=seed)
-    survey = folder / f"{kind}.laz"
-    make_survey(settings, survey, progress=f"{kind}: survey made")
-    models = [packaged_model(), wires]
-    with predict_survey(survey, models, PredictSettings(), DetectionSettings()) as prediction:
-        assert prediction.line is not None
-        return compare(kind, Corridor(settings), prediction.towers, prediction.line)
-
-
 def table(comparisons: Sequence[Comparison]) -> list[str]:
     """Lines of a Markdown table."""
     lines = [
@@ -189,27 +144,3 @@ def table(comparisons: Sequence[Comparison]) -> list[str]:
             f"{one.ordered} of {one.spans} |"
         )
     return lines
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; its exit status."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--model", type=Path, required=True, help="model of wires")
-    parser.add_argument("--towers", type=int, default=24, help="towers of a line (default 24)")
-    parser.add_argument("--seed", type=int, default=5, help="of the surveys (default 5)")
-    parser.add_argument("--kinds", nargs="+", choices=get_args(Kind), default=get_args(Kind))
-    chosen = parser.parse_args(arguments)
-    try:
-        with scratch_folder() as folder:
-            found = [
-                run(kind, chosen.towers, chosen.seed, chosen.model, folder) for kind in chosen.kinds
-            ]
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    print("\n".join(table(found)))
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,7 +9,7 @@ import pytest
 from fixtures.line_scene import PYLONS, known_line
 
 from scenenet.detection.survey_tower import SurveyTower
-from scenenet.experiments.line_truth import compare, table
+from scenenet.experiments.line_truth.conductors import compare, table
 from scenenet.line.find_line import find_line
 from scenenet.synthetic.corridor import Corridor
 from scenenet.synthetic.settings import SyntheticSettings

@@ -1,0 +1,1 @@
+"""What is found of the lines of synthetic surveys, against the truth."""

@@ -29,11 +29,15 @@ GROUND, VEGETATION, BUILDING, WIRE, OF_TOWER = PICTURED = (
 )  # fmt: skip
 """What the points of a picture are, in their order there."""
 
-WEIGHTS = 0.3, 0.35, 0.1, 0.15, 0.1
+WEIGHTS = 0.25, 0.4, 0.1, 0.15, 0.1
 """Share of each of these in a picture that has enough points of all."""
 
 BESIDE_M = 12.0
 """m beside the outermost conductors up to which a picture has points."""
+
+SQUEEZED = 0.25
+"""Share of distances to the side that counts where points are thinned: a profile shows what is
+high or low, and not what lies side by side."""
 
 STEPS_MOST = 32_000
 """Steps from the middle of a picture to its ends, at most."""
@@ -67,7 +71,7 @@ class SpanPicture:
         """The picture of points of each of ``PICTURED``, (n, 3) m in the frame of a span, thinned
         to at most ``most``."""
         kept = quotas([len(part) for part in parts], WEIGHTS, most)
-        drawn = [thinned(part, n) for part, n in zip(parts, kept, strict=True) if n]
+        drawn = [_thinned(part, n) for part, n in zip(parts, kept, strict=True) if n]
         stz = np.concatenate([*drawn, np.empty((0, 3))])
         low = float(np.floor(stz[:, 2].min())) if len(stz) else 0.0
         origin = round(span.length / 2, 2), low
@@ -112,7 +116,7 @@ def span_pictures(
         thin = []
         for area in areas:
             section = _parts(area, half_width, own, points, prediction, settings.few_points)
-            thin.append([frame.to_frame(thinned(part, 2 * most)) for part in section])
+            thin.append([_thinned(frame.to_frame(part), 2 * most) for part in section])
         parts = [np.concatenate(each) for each in zip(*thin, strict=True)]
         yield SpanPicture.of(span, parts, half_width, most)
 
@@ -140,3 +144,9 @@ def _parts(
         everything.xyz[wire],
         everything.xyz[of_tower],
     ]
+
+
+def _thinned(stz: np.ndarray, most: int) -> np.ndarray:
+    """At most ``most`` of the points (n, 3) m in the frame of a span."""
+    squeezed = np.array([1.0, SQUEEZED, 1.0])
+    return thinned(stz * squeezed, most) / squeezed

@@ -245,6 +245,25 @@ def test_what_is_too_near_is_named_with_its_limit(tab, pages):
     assert tab.locator("#dangers").is_visible() == (row.dangers > 0)
 
 
+def test_lengths_are_in_the_units_of_the_survey(pictures, pages, tmp_path):
+    foot, path = 0.3048, tmp_path / "feet.html"
+    metres = '"planar":"m","planar_m":1.0,"vertical":"m","vertical_m":1.0'
+    page = pages.few.read_text("utf-8")
+    assert metres in page
+    feet = metres.replace('"m"', '"ft"').replace("1.0", str(foot))
+    path.write_text(page.replace(metres, feet), "utf-8")
+    row = pages.clearances.spans[0]
+    span = next(span for span in pages.line.spans if span.span_id == row.span_id)
+    worst = next(p for p in pages.clearances.places if p.span_id == row.span_id)
+    with opened(pictures, path, width=1400) as tab:
+        assert f"{span.length / foot:.1f} ft long" in tab.locator("#span-place").inner_text()
+        cells = tab.locator("#near tbody tr").first.locator("td").all_inner_texts()
+        assert cells[1] == f"{round(worst.distance, 2) / foot:.2f}"
+        assert float(tab.locator("#cut").get_attribute("max")) == pytest.approx(
+            span.length / foot, abs=0.02
+        )
+
+
 def test_heights_can_be_true_to_scale(tab):
     tab.locator("#heights").select_option("true")
     assert tab.evaluate("ruler.view.up === ruler.view.along")

@@ -53,7 +53,16 @@ if TYPE_CHECKING:
 ASSETS = Path(__file__).parent / "assets"
 
 STYLES = ("page.css", "line.css")
-SCRIPTS = ("common.js", "list.js", "map.js", "tower.js", "span.js", "profile.js", "page.js")
+SCRIPTS = (
+    "common.js",
+    "list.js",
+    "map.js",
+    "tower.js",
+    "span.js",
+    "chart.js",
+    "profile.js",
+    "page.js",
+)
 """Parts of the style and of the script of a page, in their order there."""
 
 PAGE_BYTES = 150_000

@@ -40,7 +40,7 @@ function wireAt(wire, share) {
 // The place of a wire abreast of a place along the span; null where it does not reach.
 function wireAbreast(wire, along) {
   const share = (along - wire.start[0]) / (wire.end[0] - wire.start[0]);
-  return share < -1e-9 || share > 1 + 1e-9 ? null : wireAt(wire, share);
+  return share >= -1e-9 && share <= 1 + 1e-9 ? wireAt(wire, share) : null;
 }
 
 const middleOf = (wire) => wireAt(wire, 0.5)[1];

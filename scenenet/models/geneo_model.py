@@ -20,6 +20,12 @@ from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.mixing import mixed
 from scenenet.models.settings import Mixing
 
+ROUNDING = 1e-6
+"""More than the sum of a few responses is rounded by."""
+
+RespondsAt = Callable[[Occupancy, np.ndarray], Tensor]
+"""Gives parts (K, A) of H from grids and some of their voxels (A,)."""
+
 
 class GeneoModel(VoxelModel):
     """A convex combination of GENEO kernels (thesis Eq. 4.1).
@@ -168,14 +174,31 @@ class GeneoModel(VoxelModel):
 
         return parts
 
-    def responder_at(self) -> Callable[[Occupancy, np.ndarray], Tensor]:
+    def responder_at(self, *, above_zero: bool = False) -> RespondsAt:
         """As ``responder``, for the voxels at some positions (A,), ascending, as
-        ``Occupancy.flat`` numbers them; without cross-sections."""
-        weights = self.mixing_weights().detach()
-        orbits = [_stored(kernels) for kernels in self.orbits()]
+        ``Occupancy.flat`` numbers them; without cross-sections.
+
+        Args:
+            above_zero: whether only responses above 0 are wanted. Operators that can only lower the
+                sum are then not asked where it is below 0 already, and it stays below 0 there.
+        """
+        weights, mixes = self.mixing_weights().detach(), self.mixes
+        orbits = self.orbits()
+        stored = [_stored(kernels) for kernels in orbits]
+        lowering = [bool(kernels.max() <= 0) for kernels in orbits]
+        # An orbit takes longer than a single kernel.
+        order = sorted(range(len(orbits)), key=lambda k: (lowering[k], len(orbits[k])))
+        spare = above_zero and mixes == "convex" and bool((weights >= 0).all())
 
         def parts(occupancy: Occupancy, at: np.ndarray) -> Tensor:
-            return mixed(weights[:, None] * _answers(orbits, occupancy, at), self.mixes)
+            answers = torch.zeros((len(stored), len(at)), dtype=weights.dtype)
+            for k in order:
+                rows = np.arange(len(at))
+                if spare and lowering[k]:
+                    rows = np.flatnonzero(answers.sum(dim=0).numpy() >= -ROUNDING)
+                answer = _answers([stored[k]], occupancy, at[rows])[0]
+                answers[k, torch.from_numpy(rows)] = weights[k] * answer
+            return mixed(answers, mixes)
 
         return parts
 

@@ -27,7 +27,7 @@ from scenenet.geneo import Extent, Lattice, ShapeParameter
 from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.models.evidence import Evidence
-from scenenet.models.geneo_model import GeneoModel
+from scenenet.models.geneo_model import GeneoModel, RespondsAt
 from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.settings import (
     LARGEST_KERNEL,
@@ -297,17 +297,20 @@ class MetricSceneNet(GeneoModel):
 
         return parts
 
-    def second_responder(self) -> Callable[[Occupancy, np.ndarray], Tensor]:
-        """The answers of this observer where the first one has been asked: a function from grids,
-        whose values are the answers of the first observer, all above 0, and the rows (R,) of some
-        of their voxels, ascending, to the parts (K, R) of H there. They equal those of
-        ``responder``."""
-        answer = self.responder_at()
+    def row_responder(self, *, above_zero: bool = False) -> RespondsAt:
+        """A function from grids and the rows (R,) of some of their occupied voxels, ascending, to
+        the parts (K, R) of H there. They equal those of ``responder``. With a first observer, the
+        values of the grids are its answers, all above 0.
 
-        def parts(measured: Occupancy, rows: np.ndarray) -> Tensor:
-            section = part_of(self.section(measured), rows)
+        Args:
+            above_zero: as ``responder_at``.
+        """
+        answer = self.responder_at(above_zero=above_zero)
+
+        def parts(occupancy: Occupancy, rows: np.ndarray) -> Tensor:
+            section = part_of(self.section(occupancy), rows)
             needed = np.unique(section.rows)
-            found = answer(measured, measured.flat()[needed])
+            found = answer(occupancy, occupancy.flat()[needed])
             own = section._replace(rows=np.searchsorted(needed, section.rows).astype(np.int32))
             return _strongest_parts(found, own)
 

@@ -69,6 +69,23 @@ def test_the_parts_at_the_voxels_sum_to_the_observer():
     torch.testing.assert_close(torch.relu(torch.tanh(parts.sum(dim=0))), whole)
 
 
+def test_rows_have_the_answers_of_the_whole():
+    occupancy, _ = scene()
+    first = wire_model().first
+    assert first is not None
+    rows = np.flatnonzero(np.random.default_rng(1).random(len(occupancy.index)) < 0.3)
+    with torch.no_grad():
+        whole = first.responder()(occupancy)[:, torch.from_numpy(rows)]
+        torch.testing.assert_close(first.row_responder()(occupancy, rows), whole, rtol=0, atol=0)
+        # The ground lowers every sum, so it need not be asked where the crown has decided.
+        spared = first.row_responder(above_zero=True)(occupancy, rows)
+    lowered = whole.sum(dim=0) > 0
+    assert 0 < lowered.sum() < len(rows)
+    torch.testing.assert_close(spared[:, lowered], whole[:, lowered], rtol=0, atol=0)
+    assert spared[:, ~lowered].sum(dim=0).max() <= 0
+    assert (spared[2] == 0).sum() > (whole[2] == 0).sum()
+
+
 def test_a_quarter_turn_of_the_scene_turns_the_answer():
     occupancy, _ = scene()
     dense = occupancy.dense()[0]

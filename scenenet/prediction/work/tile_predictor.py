@@ -114,7 +114,13 @@ class TilePredictor:
     """A model at the voxel size of a survey. Its kernels are sampled once, for all tiles."""
 
     def __init__(
-        self, model: VoxelModel, measurement: str, voxel_size: float, fullest: int
+        self,
+        model: VoxelModel,
+        measurement: str,
+        voxel_size: float,
+        fullest: int,
+        *,
+        above_zero: bool = False,
     ) -> None:
         """Sample the kernels.
 
@@ -122,6 +128,8 @@ class TilePredictor:
             measurement: of the model (``ModelCard``).
             voxel_size: m.
             fullest: points in the fullest voxel of the survey (``fullest_voxel``).
+            above_zero: whether only probabilities are wanted; shares may then be wrong where the
+                probability is 0.
 
         Raises:
             InputError: the ground below a voxel would be looked for beyond the next tile.
@@ -145,12 +153,17 @@ class TilePredictor:
         self._measurement, self._fullest = measurement, fullest
         self._first: FirstAnswers | None = None
         with torch.no_grad():
-            if isinstance(self.model, MetricSceneNet) and self.model.first is not None:
-                before = TilePredictor(self.model.first, measurement, voxel_size, fullest)
-                self._first = FirstAnswers(before)
-                self._second = self.model.second_responder()
+            if isinstance(self.model, MetricSceneNet) and not self.model.linear:
+                self._at_rows = self.model.row_responder(above_zero=above_zero)
+                if self.model.first is not None:
+                    self._first = FirstAnswers(
+                        TilePredictor(
+                            self.model.first, measurement, voxel_size, fullest, above_zero=True
+                        )
+                    )
             else:
-                self._responses = self.model.responder()
+                responses = self.model.responder()
+                self._at_rows = lambda grids, rows: responses(grids)[:, torch.from_numpy(rows)]
 
     def __call__(
         self, spool: TileSpool, tiles: Sequence[Tile]
@@ -181,7 +194,6 @@ class TilePredictor:
 
     def _parts(self, spool: TileSpool, tiles: Sequence[Tile]) -> Tensor:
         """Parts (K, M) of H at the occupied voxels of the tiles."""
-        import torch
 
         from scenenet.convolution.occupancy import Occupancy
 
@@ -196,7 +208,7 @@ class TilePredictor:
             first + _inner(scene.voxel, shape, reach)
             for first, scene in zip(occupancy.offsets[:-1], scenes, strict=True)
         ]
-        return self._responses(occupancy)[:, torch.from_numpy(np.concatenate(inner))]
+        return self._at_rows(occupancy, np.concatenate(inner))
 
     def _composed(self, spool: TileSpool, tiles: Sequence[Tile]) -> Tensor:
         """The same for a model with a first observer, which is asked once for each tile, and not
@@ -221,7 +233,7 @@ class TilePredictor:
             rows.append(start + _inner(voxel, shape, reach))
             places.append(n + np.flatnonzero(answers(code_of(tile.place)) > 0))
             n += len(tile.voxel)
-        found = self._second(measured, np.concatenate(rows))
+        found = self._at_rows(measured, np.concatenate(rows))
         parts = torch.zeros((len(found), n), dtype=found.dtype)
         parts[:, torch.from_numpy(np.concatenate(places))] = found
         return parts

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import product
 from types import MappingProxyType
 
@@ -20,6 +21,10 @@ from scenenet.prediction.work.block_file import BlockFile, BlockWriter
 
 EDGE = 64
 """Voxels along the edge of a tile; a tile and its halo fit into a processor's cache."""
+
+KEPT_TILES = 128
+"""Tiles in memory, 8 or 16 bytes a voxel: a tile and its neighbours are asked for again by the next
+one."""
 
 NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)))
 """(27, 3) steps (z, y, x) from a tile to itself and to the tiles around it."""
@@ -220,6 +225,7 @@ class TileSpool:
         self._columns: dict[tuple[int, int], list[int]] = defaultdict(list)
         for code in sorted(self._files):
             self._columns[_decode(code)[1:]].append(code)
+        self._kept = lru_cache(maxsize=KEPT_TILES)(self._tile)
 
     @property
     def voxel_size(self) -> float:
@@ -239,7 +245,11 @@ class TileSpool:
         return [(code, _decode(code)) for code in sorted(self._files)]
 
     def tile(self, code: int) -> Tile:
-        """The tile with ``code``; a tile without voxels if it holds no point."""
+        """The tile with ``code``; a tile without voxels if it holds no point. The tiles that were
+        used last stay in memory."""
+        return self._kept(code)
+
+    def _tile(self, code: int) -> Tile:
         records = self._read(self.kind, code, _MEASURED if self._measured else _SPOOLED)
         voxel, inverse = np.unique(records["voxel"], return_inverse=True)
         count, total = np.bincount(inverse, weights=records["count"]), None

@@ -15,9 +15,10 @@ reproduce: $(INSTALLED)  ## every result: those of the tool, and the main compar
 demo: $(INSTALLED)  ## a survey, its tower map and a report in minutes, under results/demo/
 	$(VENV)/bin/snakemake --cores $(CORES) --configfile config/demo.yaml -- results/demo/report/index.html
 
-model: $(INSTALLED)  ## train the model that comes with the package again, and put it in
-	$(VENV)/bin/snakemake --cores $(CORES) -- results/packaged/towers.json
-	cp results/packaged/towers.json results/packaged/towers.md scenenet/models/packaged/
+model: $(INSTALLED)  ## train the models that come with the package again, and put them in
+	$(VENV)/bin/snakemake --cores $(CORES) -- results/packaged/towers.json results/packaged/wires.json
+	cp $(foreach name,towers wires,results/packaged/$(name).json results/packaged/$(name).md) \
+	  scenenet/models/packaged/
 
 test: $(INSTALLED)  ## the tests
 	$(VENV)/bin/python -m pytest -n $(CORES) --no-loadscope-reorder

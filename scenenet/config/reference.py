@@ -12,7 +12,9 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
+from scenenet.clearance.settings import ClearanceLimits
 from scenenet.config.errors import model_in
+from scenenet.config.observers import ObserverSettings
 from scenenet.config.schema import Config, SyntheticSurvey
 from scenenet.config.survey_sheet import SurveyRow
 from scenenet.core.files import write_json, write_text
@@ -43,7 +45,9 @@ This page is written by `python -m scenenet.config.reference --reference config/
 SECTIONS: Mapping[str, type[BaseModel]] = {
     "Everything": Config,
     "Each entry of `models`": ModelSettings,
+    "Each entry of `observers`": ObserverSettings,
     "Each entry of `synthetic.surveys`": SyntheticSurvey,
+    "Each entry of `clearance.limits`": ClearanceLimits,
 }
 
 
@@ -94,8 +98,8 @@ def _default(field: FieldInfo) -> str:
     value = field.get_default(call_default_factory=True)
     if value is PydanticUndefined:
         return "(must be given)"
-    if model_in(field.annotation) is not None and not value:
-        return "(none)"
+    if model_in(field.annotation) is not None:
+        return f"({len(value)} entries)" if value else "(none)"
     return f"`{json.dumps(value)}`"
 
 

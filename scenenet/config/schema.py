@@ -13,7 +13,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, ValidationError, model_validator
 
+from scenenet.clearance.settings import ClearanceSettings
 from scenenet.config.errors import explain
+from scenenet.config.observers import ObserverSettings, predicting
 from scenenet.core.errors import InputError, in_file
 from scenenet.core.provenance import FULL_BELOW_BYTES
 from scenenet.core.provided_code import KERNELS
@@ -38,6 +40,7 @@ from scenenet.models.settings import (
 )
 from scenenet.pointcloud.class_schemes import Codes
 from scenenet.pointcloud.quality.check import CheckSettings
+from scenenet.pointcloud.targets import WIRE
 from scenenet.prediction.settings import PredictSettings
 from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.tracking.store import TrackingSettings
@@ -78,6 +81,11 @@ class Prediction(PredictSettings):
 
     model: str = Field(
         "scenenet", description="name of the model whose best seed classifies surveys"
+    )
+    observers: tuple[str, ...] = Field(
+        (),
+        description="names of the observers that predict together with it. One of wires leads to "
+        "spans, conductors and clearances",
     )
 
 
@@ -125,6 +133,11 @@ class Config(Settings):
     seeds: tuple[Seed, ...] = Field(
         min_length=1, description="every model is trained once from each seed"
     )
+    observers: tuple[ObserverSettings, ...] = Field(
+        (),
+        description="models of other targets, each trained once from the first of `seeds`, on "
+        "square crops of the training surveys with the shares of `split`",
+    )
     tuning: TuningSettings = TuningSettings()
     score_towers: bool = Field(
         True,
@@ -157,6 +170,7 @@ class Config(Settings):
     label_noise: LabelNoiseSettings = LabelNoiseSettings()
     detection: DetectionSettings = DetectionSettings()
     predict: Prediction = Prediction()
+    clearance: ClearanceSettings = ClearanceSettings()
     tracking: TrackingSettings = TrackingSettings()
 
     @model_validator(mode="before")
@@ -211,8 +225,11 @@ class Config(Settings):
 
     @model_validator(mode="after")
     def _names_fit(self) -> Self:
+        of_models = [model.name for model in self.models]
+        of_observers = [observer.name for observer in self.observers]
         for what, names in (
-            ("models", [model.name for model in self.models]),
+            ("models", of_models),
+            ("models and observers", [*of_models, *of_observers]),
             ("seeds", list(self.seeds)),
             ("synthetic.surveys", [survey.name for survey in self.synthetic.surveys]),
             ("studies", [study.name for study in self.studies]),
@@ -234,8 +251,8 @@ class Config(Settings):
         for model in self.models:
             if not model.finds.is_tower:
                 raise ValueError(
-                    f"model {model.name}: target {model.target}: the workflow trains models of "
-                    "towers; train others with scenenet train --target"
+                    f"model {model.name}: target {model.target}: models are compared by the towers "
+                    "that they find; move it to observers"
                 )
             _require_measured_in_workflow(model.name, model)
             if not model.training.epochs:
@@ -247,6 +264,13 @@ class Config(Settings):
                 raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
             for plan in study.plans(self.model_named(study.model), self.voxels, self.split):
                 _require_measured_in_workflow(f"{study.model} of study {study.name}", plan.model)
+        predicting(self.predict.observers, self.observers)
+        try:
+            self.clearance.applied()
+        except InputError as error:
+            raise ValueError(
+                f"clearance.voltage: {error.problem}; add limits to clearance.limits"
+            ) from None
         self.label_noise_models()
         self.crossed_models()
         return self
@@ -283,9 +307,20 @@ class Config(Settings):
         Raises:
             InputError: a kernel cannot be read, or there are several of its name.
         """
-        named = geneos_in(self.model_dump(include={"models", "studies"}))
+        named = geneos_in(self.model_dump(include={"models", "observers", "studies"}))
         sources = {name: KERNELS.source_named(name) for name in sorted(named)}
         return {name: source.record() for name, source in sources.items() if source}
+
+    def predicting_observers(self) -> list[ObserverSettings]:
+        """The observers that predict together with the model of towers."""
+        return predicting(self.predict.observers, self.observers)
+
+    def finds_lines(self) -> bool:
+        """Whether spans, conductors and clearances follow from what predicts."""
+        return any(observer.finds.name == WIRE for observer in self.predicting_observers())
+
+    def observer_named(self, name: str) -> ObserverSettings:
+        return next(observer for observer in self.observers if observer.name == name)
 
     def model_named(self, name: str) -> ModelSettings:
         return next(model for model in self.models if model.name == name)

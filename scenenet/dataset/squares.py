@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from scenenet.core.errors import InputError
+from scenenet.core.files import read_json
 from scenenet.core.outputs import check_space
 from scenenet.core.progress import track
 from scenenet.core.scratch import scratch_folder, temporary_directory
@@ -67,6 +69,31 @@ def cut_squares(
     samples = sample_files(path)
     clouds = cut.samples(samples) if samples else cut.squares(Path(path), settings.edge)
     return store_crops(clouds, facts, store, manifest, target, fields)
+
+
+def require_squares(manifests: Sequence[str | Path], observer: str, target: str) -> None:
+    """Refuse to train an observer where no survey has a point of its target.
+
+    Args:
+        manifests: of the squares of each training survey.
+        observer: its name.
+        target: what it finds.
+
+    Raises:
+        InputError: names what each survey has instead.
+    """
+    facts = [read_json(manifest) for manifest in manifests]
+    if any(each["crops"] for each in facts):
+        return
+    reasons = "; ".join(
+        f"{entry['sample']}: {entry['reason']}" for each in facts for entry in each["skipped"]
+    )
+    raise InputError(
+        f"no training survey has a point of {target}, so the observer {observer} has nothing to "
+        f"learn from ({reasons})",
+        remedy=f"Label these points, or train without it: take {observer} out of observers and of "
+        "predict.observers in the configuration, which has it by default",
+    )
 
 
 class _Cut:

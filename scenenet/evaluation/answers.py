@@ -20,6 +20,7 @@ from scenenet.evaluation.points import PointCounts
 from scenenet.measurement.registry import PRESENCE
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.pointcloud.cloud import PointCloud
+from scenenet.pointcloud.targets import Target
 
 Predict = Callable[[VoxelSample], tuple[np.ndarray, np.ndarray]]
 """Sample -> probabilities (V,) and labels (V,) bool of all voxels of its grid."""
@@ -140,6 +141,21 @@ def rules_on(
     """The answer ``with_rules`` for each crop whose points are in ``clouds`` by its id."""
     how = predict, tau, voxel_size, detection, measurement
     return lambda sample: with_rules(clouds[sample.id], sample, *how)
+
+
+def points_on(
+    clouds: Mapping[str, PointCloud], predict: Predict, tau: float, target: Target
+) -> Callable[[VoxelSample], Answer]:
+    """The answer for another target than towers in each crop whose points are in ``clouds`` by its
+    id: the voxels that reach tau, and the points in them."""
+
+    def answer(sample: VoxelSample) -> Answer:
+        probability, _ = predict(sample)
+        voxels, cloud = probability >= tau, clouds[sample.id]
+        points = PointCounts.of(cloud, voxels[sample.grid.voxel_of(cloud.xyz)], target)
+        return Answer(points, np.flatnonzero(voxels), None)
+
+    return answer
 
 
 def no_answer(sample: VoxelSample) -> None:

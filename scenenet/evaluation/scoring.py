@@ -18,7 +18,14 @@ from scenenet.dataset.split import crops_in
 from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.answers import Answer, Answering, Predict, no_answer, rules_on
+from scenenet.evaluation.answers import (
+    Answer,
+    Answering,
+    Predict,
+    no_answer,
+    points_on,
+    rules_on,
+)
 from scenenet.evaluation.points import PointCounts
 from scenenet.evaluation.result import (
     Evaluation,
@@ -78,10 +85,12 @@ def answer_of(
     detection: DetectionSettings,
 ) -> Callable[[VoxelSample], Answer]:
     """The whole towers that a tuned model finds in each crop whose points are in ``clouds`` by its
-    id."""
+    id; of a model of another target, the points in voxels at or above tau."""
+    predict, tau = predictor(model, card), card.threshold()
+    if not card.finds.is_tower:
+        return points_on(clouds, predict, tau, card.finds)
     size = model.observed_size(card.voxel_size)
-    found = predictor(model, card), card.threshold(), size
-    return rules_on(clouds, *found, detection, card.measurement)
+    return rules_on(clouds, predict, tau, size, detection, card.measurement)
 
 
 def score(

@@ -86,12 +86,14 @@ def use_models(
         model, card = read_model(path)
         card.threshold()  # fail before the work: without tau no voxel is found
         size = observed_voxel_size(model, card, settings)
-        used.append(UsedModel(path, model, card, size, _code(card.finds, scheme)))
+        used.append(UsedModel(path, model, card, size, code_of_target(card.finds, scheme)))
     _require_different(used)
     return tuple(sorted(used, key=lambda each: not each.target.is_tower))
 
 
-def _code(target: Target, scheme: ClassScheme | None) -> int | None:
+def code_of_target(target: Target, scheme: ClassScheme | None) -> int | None:
+    """Class code that points taken for a target get (``UsedModel.code``); arguments as
+    ``use_models``."""
     if target.is_tower:
         return TOWER_CODE
     return scheme.main_code("conductor") if scheme and target.name == WIRE else None

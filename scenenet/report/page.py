@@ -15,6 +15,7 @@ from scenenet.report.context import ReportContext, SectionMaker
 from scenenet.report.sections import claims as claim_sections
 from scenenet.report.sections import crops as crop_sections
 from scenenet.report.sections import dataset as dataset_sections
+from scenenet.report.sections import lines as line_sections
 from scenenet.report.sections import models as model_sections
 from scenenet.report.sections import overview
 from scenenet.report.sections import parameters as parameter_sections
@@ -42,6 +43,8 @@ SECTIONS: Sequence[SectionMaker] = (
     *(make for name, make in EXPERIMENT_SECTIONS.items() if name != MAIN_EXPERIMENT),
     claim_sections.published_numbers,
     survey_sections.predictions,
+    line_sections.lines,
+    line_sections.observers,
     dataset_sections.data,
     dataset_sections.towers,
     dataset_sections.voxels,

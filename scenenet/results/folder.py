@@ -94,11 +94,14 @@ class Prediction:
         summary: what was classified, with which model.
         towers: the tower list.
         page: its page, if there is one.
+        spans, clearances: the tables of its lines, a row per span; None without lines.
     """
 
     summary: PredictionSummary
     towers: Sequence[SurveyTower]
     page: Path
+    spans: pd.DataFrame | None = None
+    clearances: pd.DataFrame | None = None
 
 
 @dataclass(frozen=True)
@@ -117,6 +120,7 @@ class Results:
         studies: the studies of the run.
         experiments: names of the experiments of the run (``scenenet.experiments.registry``).
         predicts: the model that classifies surveys; None for the first SCENE-Net.
+        observers: names of the models of other targets, each trained from the first seed.
     """
 
     folder: Path
@@ -127,6 +131,7 @@ class Results:
     studies: Sequence[StudySettings] = ()
     experiments: Sequence[str] = ()
     predicts: str | None = None
+    observers: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", Path(self.folder))
@@ -166,6 +171,16 @@ class Results:
         Raises:
             InputError: it has not been evaluated, or a file is broken.
         """
+        tuned = self._files("models", model, f"seed-{seed}")
+        return self._seed(model, self.models[model], seed, tuned)
+
+    def observer(self, name: str) -> SeedResult | None:
+        """An observer, trained, tuned and evaluated; None if it was not evaluated."""
+        if not self.seeds or not self._evaluation(name, self.seeds[0]).exists():
+            return None
+        return self._seed(name, "scenenet", self.seeds[0], self._files("models", ".", name))
+
+    def _seed(self, model: str, kind: str, seed: int, tuned: tuple[Path, ...]) -> SeedResult:
         training = self.folder / "train" / model / f"seed-{seed}"
         evaluation = read_typed(self._evaluation(model, seed), Evaluation.from_json)
         tuning = self.folder / "tune" / model / f"seed-{seed}.json"
@@ -173,14 +188,14 @@ class Results:
         resources = training / "resources.json"
         return SeedResult(
             model=model,
-            kind=self.models[model],
+            kind=kind,
             seed=seed,
             evaluation=evaluation,
             tuning=read_typed(tuning, Tuning.from_json) if tuning.exists() else None,
             history=read_table(history) if history.exists() else None,
             provenance=read_result(provenance) if provenance.exists() else None,
             resources=read_result(resources) if resources.exists() else None,
-            model_files=self._files("models", model, f"seed-{seed}"),
+            model_files=tuned,
         )
 
     def interactive_crop(self, rank: str) -> InteractiveCrop | None:
@@ -281,7 +296,14 @@ class Results:
         if not summary.exists() and not towers.exists():
             return None
         read = read_typed(summary, PredictionSummary.from_json)
-        return Prediction(read, read_towers(towers), folder / f"{survey}.html")
+        spans, clearances = (folder / f"{survey}.{name}.csv" for name in ("spans", "clearances"))
+        return Prediction(
+            read,
+            read_towers(towers),
+            folder / f"{survey}.html",
+            read_table(spans) if read.line is not None else None,
+            read_table(clearances) if read.line and read.line["clearances"] else None,
+        )
 
     def provenances(self) -> list[tuple[str, Mapping[str, Any]]]:
         """Every provenance record with its path in the result folder, sorted.

@@ -21,6 +21,7 @@ from scenenet.metrics.score_columns import SCORES, TRUTH
 from scenenet.results.dataset_tables import classes, dataset, towers, voxelisation
 from scenenet.results.folder import Results
 from scenenet.results.model_tables import certificate, parameters, times, turns
+from scenenet.results.observer_tables import observers
 from scenenet.results.score_tables import (
     models,
     point_scores,
@@ -57,6 +58,7 @@ TABLES: Mapping[str, Table] = {
     "whole_towers": Table("Voxels at or above tau, and whole towers", "models", whole_towers),
     "tower_scores": Table("Towers found", "models", tower_scores),
     "point_scores": Table("Points of the towers found", "models", point_scores),
+    "observers": Table("Observers of other targets", "observers", observers),
     "times": Table("Times", "models", times, times=True),
     "seed_times": Table("Times of each seed", "models", seed_times, times=True),
     "experiment_times": Table(

@@ -27,7 +27,8 @@ def model_groups(
     pictures: Sequence[Picture] = (),
     study: str = "reproduction",
 ) -> list[RunGroup]:
-    """One parent per model, the boosted trees included, with a nested run per seed.
+    """One parent per model, the boosted trees and the observers included, with a nested run per
+    seed.
 
     Args:
         results: the result folder.
@@ -38,12 +39,17 @@ def model_groups(
         study: the question the runs belong to, for a tag.
     """
     base = {"study": study, "dataset": dataset, "protocol": protocol}
-    source = (results.folder / "split" / "split.csv").as_posix()
     groups = []
     trainings = {model: results.of_model(model) for model in results.models}
-    for model, trained in (trainings | {BOOSTED_TREES: results.boosted_trees}).items():
+    observed = {
+        name: [found] for name in results.observers if (found := results.observer(name)) is not None
+    }
+    others = {BOOSTED_TREES: results.boosted_trees, **observed}
+    for model, trained in (trainings | others).items():
         if not trained:
             continue
+        split = f"square_split/{model}" if model in observed else "split"
+        source = (results.folder / split / "split.csv").as_posix()
         own = (settings or {}).get(model, {})
         key = f"{study}/{dataset}/{model}"
         children = [_seed_record(result, key, base, own, source) for result in trained]

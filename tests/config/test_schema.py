@@ -13,6 +13,9 @@ from scenenet.config import reference as config_reference
 from scenenet.config.schema import Config, load, merged
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
+from scenenet.core.settings import changed
+from scenenet.pointcloud.targets import Target
+from scenenet.training.presets import preset
 
 MODELS = [{"name": "scenenet", "kind": "scenenet"}, {"name": "cnn", "kind": "cnn"}]
 
@@ -234,6 +237,50 @@ def test_a_cnn_of_protocol_operational_is_refused_with_what_to_write_instead():
     message = complaint(models=[{"name": "m", "kind": "cnn", "protocol": "operational"}])
     assert "models[0]: protocol: without effect for a cnn; remove it" in message
     assert "training.init: informed" in message
+
+
+WIRES = {"name": "wires", "target": "wire"}
+
+
+@pytest.mark.parametrize(
+    ("observers", "predicting", "message"),
+    [
+        ([WIRES], ["wire"], "predict.observers: wire is not one of the observers: wires"),
+        ([], ["wires"], "wires is not one of the observers: there are none"),
+        ([WIRES, {**WIRES, "name": "fine"}], ["wires", "fine"], "wires and fine both find wire"),
+        ([WIRES], ["wires", "wires"], "lists an observer twice"),
+        ([{**WIRES, "name": "m"}], [], "models and observers: m is listed more than once"),
+        ([{**WIRES, "target": "tower"}], [], "models of towers stand in models"),
+        ([{**WIRES, "target": "lamp"}], [], "observers[0].target: there is no target 'lamp'"),
+        ([{**WIRES, "changes": {"search.strats": 3}}], [], "changes: search.strats"),
+        ([{**WIRES, "changes": {"kind": "cnn"}}], [], "kind cannot be changed"),
+        ([{**WIRES, "changes": {"measurement": "density"}}], [], "measures presence"),
+    ],
+)
+def test_an_observer_that_cannot_be_used_is_refused(observers, predicting, message):
+    model = {"name": "m", "kind": "scenenet"}
+    chosen = {"model": "m", "observers": predicting}
+    assert message in complaint(models=[model], observers=observers, predict=chosen)
+
+
+def test_an_observer_has_the_settings_of_the_command_line_but_for_its_changes():
+    observer = load(raw(observers=[{**WIRES, "changes": {"search.starts": 9}}])).observers[0]
+    usual = preset("scenenet", "operational", target=Target("wire"))
+    own = observer.model()
+    assert own.search.starts == 9
+    assert changed(own, {"name": usual.name, "search.starts": usual.search.starts}) == usual
+    assert (observer.grid().fit, observer.grid().voxel_size) == ("metric", 0.5)
+
+
+def test_lines_follow_from_an_observer_of_wires_that_predicts():
+    observers = [WIRES, {"name": "crowns", "target": "vegetation"}]
+    for names, lines in (([], False), (["crowns"], False), (["crowns", "wires"], True)):
+        chosen = {"model": "scenenet", "observers": names}
+        assert load(raw(observers=observers, predict=chosen)).finds_lines() is lines
+
+
+def test_a_voltage_without_limits_is_refused():
+    assert "clearance.voltage: there are no limits" in complaint(clearance={"voltage": 900})
 
 
 def test_an_unknown_kernel_is_refused_with_the_nearest_name():

@@ -8,7 +8,7 @@ import pytest
 from scenenet.core.errors import InputError
 from scenenet.dataset.crops import read_crops
 from scenenet.dataset.square_settings import SquareSettings
-from scenenet.dataset.squares import cut_squares
+from scenenet.dataset.squares import cut_squares, require_squares
 from scenenet.dataset.voxel_cache import build, load
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.pointcloud import PointCloud, class_scheme, write_las
@@ -62,6 +62,18 @@ def test_a_survey_without_the_target_is_named_with_the_codes_it_has(tmp_path):
             "reason": "no point is labelled lamp (class code 14 in edp); the codes in it are 2, 16",
         }
     ]
+
+
+def test_an_observer_without_a_point_of_its_target_is_refused(tmp_path):
+    write_las(tmp_path / "s.laz", field([(3.5, 3.5)]))
+    for target in ("wire", "lamp=14"):
+        (tmp_path / target).mkdir()
+        cut(tmp_path / "s.laz", tmp_path / target, target)
+    without, wires = (tmp_path / target / "crops.json" for target in ("lamp=14", "wire"))
+    require_squares([without, wires], "lamps", "lamp=14")
+    with pytest.raises(InputError, match="observer lamps has nothing to learn from") as caught:
+        require_squares([without, without], "lamps", "lamp=14")
+    assert "s.laz: no point is labelled lamp" in str(caught.value)
 
 
 def test_the_truth_of_a_square_is_that_of_its_points(tmp_path):

@@ -14,12 +14,14 @@ from scenenet.evaluation.answers import (
     Answer,
     at_or_above_tau,
     group_places,
+    points_on,
     with_rules,
 )
 from scenenet.evaluation.points import PointCounts
 from scenenet.experiments.components.sources import LabelledCrop
 from scenenet.models.model_file import write_model
 from scenenet.models.predictions import probabilities
+from scenenet.pointcloud.targets import Target
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
 
@@ -55,6 +57,17 @@ def test_the_answer_with_rules_is_that_of_predict(crop, shift, pole_finder, tmp_
     assert answer.points == PointCounts.of(cloud, own)
     assert np.array_equal(answer.voxels, np.unique(grid.voxel_of(cloud.xyz[own])))
     assert answer.towers == pytest.approx(np.array(places), abs=1e-3)
+
+
+def test_of_another_target_the_points_in_voxels_at_or_above_tau_count(crop):
+    def labels(sample):
+        return sample.labels().astype(np.float32), sample.labels()
+
+    answer = points_on({"crop": crop.cloud}, labels, 0.5, Target.parse("pole=15"))(crop.sample)
+    assert answer.towers is None
+    poles = crop.cloud.classification == 15
+    assert (answer.points.labels.tp, answer.points.labels.fn) == (poles.sum(), 0)
+    np.testing.assert_array_equal(answer.voxels, np.flatnonzero(crop.sample.labels()))
 
 
 def test_rules_alone_find_poles_and_not_the_tree(crop):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 
 import laspy
@@ -13,15 +12,11 @@ from fixtures import scenes
 
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.detection.settings import DetectionSettings
-from scenenet.line.catenary import Catenary
-from scenenet.models.factory import new_model
 from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, write_las
-from scenenet.pointcloud.targets import Target
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.writers import predict_to_files
-from scenenet.training.presets import preset
 
 VOLTAGE = 66.0
 
@@ -73,12 +68,7 @@ def line_page(line, model, tmp_path_factory) -> Path:
 def wire_finder(tmp_path_factory) -> Path:
     """A model of wires with numbers set by hand."""
     path = tmp_path_factory.mktemp("wires") / "wires.json"
-    found = new_model(preset("scenenet", "operational", target=Target.parse("wire")), 0)
-    numbers = found.numbers()
-    numbers[-2:] = 0.7, 0.15  # of the mixture of the first observer: about a half and two quarters
-    found.set_numbers(numbers)
-    card = scenes.model_card(name="wires", target="wire", voxel_size=0.5, tau=0.2)
-    write_model(path, found, card)
+    write_model(path, *scenes.make_wire_finder())
     return path
 
 
@@ -87,14 +77,9 @@ def hung_line(scene, tmp_path_factory) -> Path:
     """Three poles in a row, and a wire to the second one that ends before the third."""
     poles = [(x, 15.5) for x in scenes.POLES_X]
     cloud = scene(poles, size=(150.0, 31.0), tree=(100.0, 20.0))
-    x = np.arange(3.0, 103.0, 0.2)
-    z = np.empty_like(x)
-    for start, end in pairwise((scenes.POLES_X[0] - 45.0, *scenes.POLES_X)):
-        wire = Catenary((start, 15.5, scenes.WIRE_Z), (end, 15.5, scenes.WIRE_Z), 900.0)
-        own = (x >= start) & (x <= end)
-        z[own] = wire.height(x[own] - start)
-    places = np.column_stack([x, np.full(len(x), 15.5), z]) + scenes.PLACE
-    codes = np.append(cloud.classification, np.full(len(x), 16, np.uint8))
+    ends = scenes.POLES_X[0] - 45.0, *scenes.POLES_X
+    places = scenes.hung_wire(ends, 15.5, scenes.WIRE_Z, 3.0, 103.0)
+    codes = np.append(cloud.classification, np.full(len(places), 16, np.uint8))
     path = tmp_path_factory.mktemp("hung") / "line.laz"
     write_las(path, PointCloud(np.concatenate([cloud.xyz, places]), codes, crs=pyproj.CRS(32629)))
     return path

@@ -55,16 +55,17 @@ def run_jobs(survey: SurveyFiles, model: Path, folder: Path, fullest: bool) -> P
     most = fullest_in(survey, works, model) if fullest else None
     predictions = [out.with_suffix(".predictions") for out in works]
     for number, out in enumerate(predictions):
-        predict_tile(works[number], works[:number] + works[number + 1 :], model, out, 400.0, most)
+        others = works[:number] + works[number + 1 :]
+        predict_tile(works[number], others, model, out, 400.0, most, SETTINGS)
     find_towers_of(survey, works, predictions, model, LONE_POLES, work / "towers", work / "near")
     records = [out.with_suffix(".json") for out in works]
     written = [path.stem for path in survey.files if (work / "near" / f"{path.stem}.json").exists()]
     for number, path in enumerate(survey.files[: len(written)]):
         near = work / "near" / f"{path.stem}.json"
-        write_tile(works[number], predictions[number], near, files.points[path], records[number],
+        write_tile(works[number], [predictions[number]], near, files.points[path], records[number],
                    SETTINGS, None)  # fmt: skip
     done = records[: len(written)]
-    write_lists(survey, works, predictions, work / "towers", done, model, files, SETTINGS,
+    write_lists(survey, works, [predictions], work / "towers", done, [model], files, SETTINGS,
                 LONE_POLES)  # fmt: skip
     return files
 
@@ -104,7 +105,7 @@ def test_a_file_in_another_system_at_the_same_numbers_has_no_effect(tiles, model
 def test_a_distance_that_is_too_small_for_the_voxels_is_refused(tiles, model, tmp_path):
     read_file(tiles / "a.laz", "a.laz", tmp_path / "a.work", 1.0, 1000)
     with pytest.raises(InputError, match="need the tiles within"):
-        predict_tile(tmp_path / "a.work", [], model, tmp_path / "out", 60.0, None)
+        predict_tile(tmp_path / "a.work", [], model, tmp_path / "out", 60.0, None, SETTINGS)
 
 
 def test_a_file_that_is_not_the_planned_one_is_not_used(tiles, tmp_path):
@@ -128,17 +129,18 @@ def test_a_copy_that_took_the_place_of_a_file_is_written_and_another_file_is_not
     info = survey_info(path)
     box = (*info.mins[:2], *info.maxs[:2])
     read_file(path, "a.laz", out[0], 1.0, 1000, None, PlannedFile(known, box))
-    predict_tile(out[0], [], model, out[1], 400.0, None)
+    predict_tile(out[0], [], model, out[1], 400.0, None, SETTINGS)
+    inputs = out[0], [out[1]], *out[2:]
     write_json(out[2], {"system": BlockFile(out[0]).facts["system"], "structures": []})
     shutil.copy(path, tmp_path / "copy")
     (tmp_path / "copy").replace(path)
     with pytest.raises(InputError, match="changed, replaced or removed"):
-        write_tile(*out, SETTINGS, None)
-    write_tile(*out, SETTINGS, None, known)
+        write_tile(*inputs, SETTINGS, None)
+    write_tile(*inputs, SETTINGS, None, known)
     assert out[3].exists()
     shutil.copy(folder / "b.laz", path)
     with pytest.raises(InputError, match="changed, replaced or removed"):
-        write_tile(*out, SETTINGS, None, known)
+        write_tile(*inputs, SETTINGS, None, known)
 
 
 def test_a_tower_is_in_the_small_file_of_each_tile_that_it_reaches_into(tiles, model, tmp_path):

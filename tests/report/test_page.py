@@ -9,14 +9,16 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from fixtures.result_folder import with_truth
+from fixtures.result_folder import with_observer, with_truth
 
+from scenenet.clearance.records import SPAN_CLEARANCE_COLUMNS
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json, write_json
 from scenenet.experiments.published import Thesis
 from scenenet.experiments.studies.run import COLUMNS
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
+from scenenet.line.records import AS_FLOWN, SPAN_COLUMNS
 from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
 from scenenet.results.folder import Results
@@ -214,6 +216,30 @@ def test_a_survey_without_towers_says_so(page: Path, results: Results, thesis: T
     file.write_text('{"type": "FeatureCollection", "features": []}')
     write_report(results, thesis, page)
     assert "No tower was found in fresh." in read(page).text
+
+
+def test_a_survey_with_lines_has_its_spans_and_its_worst_clearances(
+    results: Results, thesis: Thesis, tmp_path: Path
+):
+    folder = results.folder / "predict" / "fresh"
+    summary = read_json(folder / "fresh.summary.json")
+    counts = {"dangers": 3, "few_points": 1, "fall_trees": 0, "nearest_m": {}, "kinds": "height",
+              "limits": "66 kV: ours"}  # fmt: skip
+    summary["line"] = {"lines": 1, "spans": 12, "conductors": 36, "earth_wires": 0, "cables": 0,
+                       "to_look_at": 2, "positions": AS_FLOWN, "clearances": counts}  # fmt: skip
+    write_json(folder / "fresh.summary.json", summary)
+    for name, columns in (("spans", SPAN_COLUMNS), ("clearances", SPAN_CLEARANCE_COLUMNS)):
+        rows = [{c.name: n if c.type in (int, float) else "" for c in columns} for n in range(12)]
+        pd.DataFrame(rows).to_csv(folder / f"fresh.{name}.csv", index=False)
+    found = with_observer(results)
+    write_tables(found, thesis, found.folder / "tables", ["observers"])
+    write_report(found, thesis, tmp_path / "page.html")
+    page = read(tmp_path / "page.html")
+    text = page.text
+    assert {"lines", "observers"} <= {each.get("id") for each in page.all("section")}
+    assert AS_FLOWN.capitalize() in text
+    assert "The first 10 of 12 spans." in text
+    assert "places closer than the limits" in text and "66 kV: ours" in text
 
 
 def test_files_that_were_not_predicted_are_named_with_the_reason(

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from fixtures.result_folder import with_observer
 
 from scenenet.core.errors import InputError
 from scenenet.evaluation.result import Scores
@@ -151,6 +152,20 @@ def test_scores_against_the_truth_have_columns_of_their_own(results: Results, th
     assert (known["truth_f05"], known["truth_point_iou"]) == (0.125, 0.25)
     assert known["truth_average_precision"] == known["average_precision"]
     assert seeds["truth_f05"].notna().sum() == 1
+
+
+def test_an_observer_has_a_row_of_its_own_and_none_among_the_models(
+    results: Results, thesis: Thesis
+):
+    assert tables.observers(results, thesis).empty
+    found = with_observer(results)
+    [row] = tables.observers(found, thesis).to_dict("records")
+    assert (row["observer"], row["target"], row["seed"]) == ("wires", "wire", 0)
+    scores = found.seed("scenenet", 0).evaluation
+    assert row["voxel_iou_tower"] == scores.voxel.iou_tower
+    assert row["squares"] == scores.voxel.n_samples
+    assert row["parameters"] == read_model(found.folder / "models/wires.json")[0].n_parameters()
+    assert "wires" not in set(tables.models(found, thesis)["model"])
 
 
 def test_training_time_is_the_sum_of_the_epochs(results: Results, thesis: Thesis):

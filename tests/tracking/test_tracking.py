@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from fixtures.result_folder import with_truth
+from fixtures.result_folder import with_observer, with_truth
 from mlflow import MlflowClient
 from mlflow.entities import ViewType
 
@@ -227,6 +227,16 @@ def test_the_boosted_trees_have_runs_like_the_models(settings, client, results, 
     assert seed.data.tags["kind"] == BOOSTED_TREES
     assert parent.data.metrics["test_precision_mean"] == pytest.approx(0.6)
     assert [a.path for a in client.list_artifacts(seed.info.run_id)] == ["figures"]
+
+
+def test_an_observer_has_a_run_whose_tag_says_what_it_finds(results):
+    groups = model_groups(with_observer(results), "corridors")
+    assert len(groups) == len(model_groups(results, "corridors")) + 1
+    group = next(g for g in groups if g.parent.tags["model"] == "wires")
+    [run] = group.children
+    assert (run.tags["target"], group.parent.tags["target"]) == ("wire", "wire")
+    assert run.datasets[0].source.endswith("square_split/wires/split.csv")
+    assert run.artifacts.keys() == {"model/wires.json"}
 
 
 def test_logging_again_keeps_every_run(settings, client, results, tmp_path):

@@ -76,8 +76,10 @@ def _configure(project: Project, recorded: Path) -> None:
 
 
 def _tiny(test: dict[str, Any]) -> dict[str, Any]:
-    """The small configuration, without its new survey and with an inbox."""
+    """The small configuration, without its new survey and its observer (``test_observers``), and
+    with an inbox."""
     test["synthetic"]["surveys"] = test["synthetic"]["surveys"][:2]
+    test["observers"], test["predict"]["observers"] = [], []
     own = {"results_dir": "results", "surveys": "config/surveys.tsv", "dataset": "tiny"}
     return {**test, **own, "new_surveys": {"folder": "surveys", "codes": "edp"}}
 

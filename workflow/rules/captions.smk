@@ -10,6 +10,7 @@ CATEGORIES = {
     "page": "1 Page",
     "thesis": "2 Models",
     "models": "2 Models",
+    "observers": "2 Models",
     "learned": "2 Models",
     "training": "2 Models",
     "crops": "2 Models",

@@ -172,6 +172,24 @@ def champion_file(model):
     return f"{R}/models/{model}{suffix_of(model)}"
 
 
+def observer_files():
+    """The models that predict together with that of towers."""
+    return [f"{R}/models/{name}.json" for name in settings.predict.observers]
+
+
+def scheme_of(survey):
+    """What the class codes of a survey mean, which lines need; without lines, nothing."""
+    return {"codes": SURVEYS[survey].codes} if settings.finds_lines() else {}
+
+
+def classes_of(survey):
+    """What lines need besides the models: the classes of a survey, by which points near a conductor
+    are told apart, and how clearances are measured. Without lines, nothing."""
+    if not settings.finds_lines():
+        return {}
+    return {**scheme_of(survey), "clearance": SETTINGS["clearance"]}
+
+
 def plans_of_tiles():
     """The tiles of each survey that has several files. Their headers are looked at once."""
     cache = HeaderCache(".snakemake/scenenet-tiles.json")
@@ -201,6 +219,10 @@ except InputError as error:
 
 R = settings.results_dir
 SETTINGS = settings.plain()
+# Settings of a prediction, without the names of the models that predict.
+PREDICT = {
+    name: value for name, value in SETTINGS["predict"].items() if name not in ("model", "observers")
+}
 GRID = settings.voxels.label
 # Sorted, so that the order of the rows in the survey sheet does not matter.
 TRAIN = sorted(filter(trained_on, SURVEYS))
@@ -231,6 +253,7 @@ STUDY_JOBS = {
 VALUES = {
     "survey": [*TRAIN, *NEW],
     "model": [model.name for model in settings.models],
+    "observer": [observer.name for observer in settings.observers],
     "seed": list(settings.seeds),
     "study": [study.name for study in settings.studies],
     "study_job": [*STUDY_JOBS],
@@ -253,6 +276,7 @@ wildcard_constraints:
     synthetic=any_of(survey.name for survey in settings.synthetic.surveys),
     survey=any_of(VALUES["survey"]),
     model=any_of(VALUES["model"]),
+    observer=any_of(VALUES["observer"]),
     tile=r"[^/].*",
     study=any_of(VALUES["study"]),
     study_job=any_of(VALUES["study_job"]),

@@ -1,4 +1,5 @@
-"""The model that comes with the package: the best seed of the model that predicts, with its card."""
+"""The models that come with the package, each with its card: the best seed of the model that predicts,
+and the first observer of wires."""
 
 packaged = settings.model_named(settings.predict.model)
 
@@ -36,3 +37,39 @@ if packaged.kind == "scenenet" and packaged.protocol == "operational":
             "Writing the model that comes with the package, and its card"
         script:
             "../scripts/packaged_model.py"
+
+
+WIRES = [observer.name for observer in settings.observers if observer.finds.name == "wire"]
+
+if WIRES:
+
+    rule packaged_wires:
+        input:
+            model=f"{R}/models/{WIRES[0]}.json",
+            scores=every("evaluate_observer", "scores", observer=WIRES[:1]),
+            tunings=every("tune_observer", "tuning", observer=WIRES[:1]),
+            split=f"{R}/square_split/{WIRES[0]}/split.csv",
+        output:
+            model=f"{R}/packaged/wires.json",
+            card=f"{R}/packaged/wires.md",
+            provenance=f"{R}/packaged/wires.provenance.json",
+        log:
+            f"{R}/logs/packaged_wires.log",
+        benchmark:
+            f"{R}/benchmarks/packaged_wires.tsv"
+        conda:
+            "../envs/scenenet.yaml"
+        threads: 1
+        resources:
+            mem_mb=1000,
+            runtime=10,
+        params:
+            job=job(
+                "packaged_wires",
+                {},
+                results=results_of(models=[], observers=WIRES[:1]),
+            ),
+        message:
+            "Writing the model of wires that comes with the package, and its card"
+        script:
+            "../scripts/packaged_wires.py"

@@ -1,11 +1,30 @@
-"""Predictions of surveys of one file: classified, with a list of their towers."""
+"""Predictions of surveys of one file: classified, with a list of their towers, and with the spans,
+conductors and clearances of their lines if an observer of wires predicts as well."""
+
+
+def line_tables():
+    """The tables of the lines of a survey, by the names of the outputs."""
+    if not settings.finds_lines():
+        return {}
+    return {
+        name: in_report(
+            f"{R}/predict/{{survey}}/{{survey}}.{name}.csv",
+            f"prediction-{name}",
+            "predictions",
+            "Files",
+            {"survey": "{survey}", "file": name.capitalize()},
+        )
+        for name in ("spans", "conductors", "clearances")
+    }
 
 
 rule predict:
     input:
         survey=lambda w: source(w.survey),
         model=champion_file(settings.predict.model),
+        observers=observer_files(),
     output:
+        **line_tables(),
         points=f"{R}/predict/{{survey}}/{{survey}}.laz",
         geopackage=f"{R}/predict/{{survey}}/{{survey}}.gpkg",
         geojson=in_report(
@@ -40,10 +59,11 @@ rule predict:
     params:
         job=lambda w: job(
             "predict",
-            {name: value for name, value in SETTINGS["predict"].items() if name != "model"},
+            PREDICT,
             detection=SETTINGS["detection"],
             input={"survey": source_print(w.survey)},
             **given_system(w.survey),
+            **classes_of(w.survey),
         ),
     message:
         "Classifying {wildcards.survey}"

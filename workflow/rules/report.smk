@@ -41,11 +41,21 @@ rule report:
         scores=every("evaluate", "scores"),
         tunings=every("tune", "tuning"),
         models=every("tune", "model"),
+        observers=[
+            *every("tune_observer", "model"),
+            *every("evaluate_observer", "scores"),
+        ],
         certificates=every("certificate", "certificate"),
         checks=every("check", "report"),
         towers=every_prediction("geojson"),
         summaries=every_prediction("summary"),
         pages=every_prediction("page"),
+        lines=[
+            file
+            for name in line_tables()
+            if name != "conductors"
+            for file in every_prediction(name)
+        ],
         records=every_record(),
         thesis=ancient(own_file(settings.thesis)),
     output:

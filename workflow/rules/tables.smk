@@ -15,6 +15,10 @@ rule tables:
         tunings=every("tune", "tuning"),
         models=every("tune", "model"),
         scores=every("evaluate", "scores"),
+        observers=[
+            *every("tune_observer", "model"),
+            *every("evaluate_observer", "scores"),
+        ],
         studies=[*every("join_study", "runs"), *every("join_study", "times")],
         experiments=[*every("join_runs", "runs"), *every("join_runs", "times")],
         boosted_trees=[*every("boosted_trees", "scores"), *every("boosted_trees", "times")],
@@ -40,7 +44,11 @@ rule tables:
         job=job(
             "tables",
             {},
-            results=results_of(studies=VALUES["study"], experiments=EXPERIMENTS),
+            results=results_of(
+                studies=VALUES["study"],
+                experiments=EXPERIMENTS,
+                observers=VALUES["observer"],
+            ),
             input=THESIS,
         ),
     message:

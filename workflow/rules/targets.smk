@@ -74,7 +74,13 @@ def _files(rule, output, values):
     patterns, declared = (getattr(of.output, output) for of in (rule, rule.rule))
     if "tile" in rule.rule.wildcard_names:
         each = [(survey, tile) for survey in TILED for tile in PLANS[survey].tiles]
-        return [f for survey, tile in each for f in expand(patterns, survey=survey, tile=tile)]
+        observed = "observer" in rule.rule.wildcard_names
+        others = {"observer": settings.predict.observers} if observed else {}
+        return [
+            file
+            for survey, tile in each
+            for file in expand(patterns, survey=survey, tile=tile, **others)
+        ]
     single = isinstance(patterns, str)
     files = expand(list([patterns] if single else patterns), **{**_wildcards(rule), **values})
     # The outputs that ``rules`` hands on have lost this flag.
@@ -116,18 +122,27 @@ def each_seed_of(model):
     ]
 
 
-def results_of(models=None, surveys=TRAIN, predicted=(), studies=(), experiments=(), predicts=None):
+def results_of(
+    models=None,
+    surveys=TRAIN,
+    predicted=(),
+    studies=(),
+    experiments=(),
+    predicts=None,
+    observers=(),
+):
     """The arguments of ``scenenet.results.folder.Results`` besides its folder. Models are pairs, because their
     order counts and that of a dict does not survive in a parameter."""
     chosen = settings.models if models is None else models
     return {
         "models": [[model.name, model.kind] for model in chosen],
-        "seeds": list(settings.seeds) if chosen else [],
+        "seeds": list(settings.seeds) if [*chosen, *observers] else [],
         "surveys": list(surveys),
         "predicted": list(predicted),
         "studies": [study_settings(study) for study in studies],
         "experiments": list(experiments),
         "predicts": predicts,
+        "observers": list(observers),
     }
 
 
@@ -137,6 +152,7 @@ def all_results():
         studies=VALUES["study"],
         experiments=EXPERIMENTS,
         predicts=settings.predict.model,
+        observers=VALUES["observer"],
     )
 
 

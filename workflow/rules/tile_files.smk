@@ -1,7 +1,6 @@
 """The files of a survey of tiles, for its rules (``tiles.smk``)."""
 
 DENSITY = settings.model_named(settings.predict.model).measurement == "density"
-PREDICT = {name: value for name, value in SETTINGS["predict"].items() if name != "model"}
 
 
 def tile_of(w):
@@ -45,9 +44,49 @@ def fullest_file(w):
 
 
 def near_tile(w):
-    """The towers that reach into a tile."""
+    """The towers that reach into a tile; where lines are found, those that they asked for as well, and
+    the conductors."""
+    if settings.finds_lines():
+        checkpoints.conductors.get(survey=w.survey)
+        return f"{R}/predict/{w.survey}/near_line/{w.tile}.json"
     checkpoints.find_towers.get(survey=w.survey)
     return f"{R}/predict/{w.survey}/near/{w.tile}.json"
+
+
+def observed_tiles(name):
+    """What an observer predicts for each tile of a survey that can be read, in their order."""
+    return lambda w: [
+        f"{R}/predict/{w.survey}/observed/{name}/{tile}.predictions"
+        for tile in PLANS[w.survey].tiles
+    ]
+
+
+def observed_by_all(w):
+    """What all observers predict for the tiles of a survey, observer by observer."""
+    return [file for name in settings.predict.observers for file in observed_tiles(name)(w)]
+
+
+def of_line(file):
+    """A file of the lines of a survey, in a list; an empty one without lines."""
+    return [f"{R}/predict/{{survey}}/work/{file}"] if settings.finds_lines() else []
+
+
+def observed_voxels():
+    """The voxels of each observer that predicts, from its settings: another model of the same settings
+    must not read all tiles again."""
+    return [
+        (
+            [observer.grid().voxel_size, model.metric.observed]
+            if (model := observer.model()).protocol == "operational"
+            else [observer.grid().voxel_size, None]
+        )
+        for observer in settings.predicting_observers()
+    ]
+
+
+def needs_classes():
+    """What is read of the points of a survey besides their places."""
+    return {"classes": True} if settings.finds_lines() else {}
 
 
 def megabytes(start, share):

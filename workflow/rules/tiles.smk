@@ -1,4 +1,5 @@
-"""Predictions of surveys of many tiles, tile by tile: read, predict, search, write.
+"""Predictions of surveys of many tiles, tile by tile: read, predict, search, write. With an observer of
+wires, the lines are found after the towers.
 
 A job knows its tile and the neighbours of that, so a new tile makes these again, and the list.
 """
@@ -21,9 +22,13 @@ rule voxel_size:
         mem_mb=1000,
         runtime=10,
     params:
-        job=job("voxel_size", {"voxel_size": PREDICT["voxel_size"]}),
+        job=job(
+            "voxel_size",
+            {"voxel_size": PREDICT["voxel_size"]},
+            observers=observed_voxels(),
+        ),
     message:
-        "Looking up the voxel size of the model that predicts"
+        "Looking up the voxel sizes of the models that predict"
     script:
         "../scripts/voxel_size.py"
 
@@ -57,6 +62,7 @@ rule read_tile:
             planned=tile_of(w).box,
             input={"tile": tile_of(w).known},
             **given_system(w.survey),
+            **needs_classes(),
         ),
     message:
         "Reading tile {wildcards.tile} of {wildcards.survey}"
@@ -118,9 +124,43 @@ rule predict_tile:
         mem_mb=megabytes(1500, 1),
         runtime=20,
     params:
-        job=job("predict_tile", {}, within=NEIGHBOURS_M),
+        job=job("predict_tile", {"voxel_size": PREDICT["voxel_size"]}, within=NEIGHBOURS_M),
     message:
         "Predicting tile {wildcards.tile} of {wildcards.survey}"
+    script:
+        "../scripts/predict_tile.py"
+
+
+rule observe_tile:
+    input:
+        work=f"{R}/predict/{{survey}}/work/{{tile}}.work",
+        neighbours=lambda w: [
+            f"{R}/predict/{w.survey}/work/{tile}.work" for tile in tile_of(w).neighbours
+        ],
+        model=f"{R}/models/{{observer}}.json",
+        fullest=[],
+    output:
+        predictions=f"{R}/predict/{{survey}}/observed/{{observer}}/{{tile}}.predictions",
+    log:
+        f"{R}/logs/observe_tile/{{survey}}/{{observer}}/{{tile}}.log",
+    benchmark:
+        f"{R}/benchmarks/observe_tile/{{survey}}/{{observer}}/{{tile}}.tsv"
+    wildcard_constraints:
+        survey=any_of(TILED),
+        observer=any_of(settings.predict.observers),
+    retries: 1
+    group:
+        together("observe_tile")
+    conda:
+        "../envs/scenenet.yaml"
+    threads: 1
+    resources:
+        mem_mb=megabytes(1500, 1),
+        runtime=20,
+    params:
+        job=job("predict_tile", {"voxel_size": PREDICT["voxel_size"]}, within=NEIGHBOURS_M),
+    message:
+        "Predicting tile {wildcards.tile} of {wildcards.survey} with {wildcards.observer}"
     script:
         "../scripts/predict_tile.py"
 
@@ -155,13 +195,90 @@ checkpoint find_towers:
         "../scripts/find_towers.py"
 
 
-# The towers that reach into a tile are a small file, which Snakemake compares by its content. It is
-# no output of a rule, but within one: else each tile would be written again whenever towers are found.
+if settings.finds_lines():
+
+    [WIRE_OBSERVER] = [
+        observer.name
+        for observer in settings.predicting_observers()
+        if observer.finds.name == "wire"
+    ]
+
+    checkpoint conductors:
+        input:
+            works=work_files("work"),
+            predictions=work_files("predictions"),
+            wires=observed_tiles(WIRE_OBSERVER),
+            towers=f"{R}/predict/{{survey}}/work/towers.json",
+        output:
+            line=f"{R}/predict/{{survey}}/work/line.json",
+            near=directory(f"{R}/predict/{{survey}}/near_line"),
+        log:
+            f"{R}/logs/conductors/{{survey}}.log",
+        benchmark:
+            f"{R}/benchmarks/conductors/{{survey}}.tsv"
+        wildcard_constraints:
+            survey=any_of(TILED),
+        conda:
+            "../envs/scenenet.yaml"
+        threads: 1
+        resources:
+            mem_mb=megabytes(3000, 0.2),
+            runtime=480,
+        params:
+            job=lambda w: job(
+                "conductors", SETTINGS["detection"], survey=PLANS[w.survey].survey.to_json()
+            ),
+        message:
+            "Finding the spans and conductors of {wildcards.survey}"
+        script:
+            "../scripts/conductors.py"
+
+    rule clearances:
+        input:
+            works=work_files("work"),
+            wires=observed_tiles(WIRE_OBSERVER),
+            line=f"{R}/predict/{{survey}}/work/line.json",
+        output:
+            clearances=f"{R}/predict/{{survey}}/work/clearances.json",
+        log:
+            f"{R}/logs/clearances/{{survey}}.log",
+        benchmark:
+            f"{R}/benchmarks/clearances/{{survey}}.tsv"
+        wildcard_constraints:
+            survey=any_of(TILED),
+        conda:
+            "../envs/scenenet.yaml"
+        threads: 1
+        resources:
+            mem_mb=megabytes(3000, 0.1),
+            runtime=480,
+        params:
+            job=lambda w: job(
+                "clearances",
+                SETTINGS["clearance"],
+                survey=PLANS[w.survey].survey.to_json(),
+                codes=SURVEYS[w.survey].codes,
+            ),
+        message:
+            "Measuring the clearances of {wildcards.survey}"
+        script:
+            "../scripts/clearances.py"
+
+
+# The towers and the conductors that reach into a tile are small files, which Snakemake compares by their
+# content. They are no output of a rule, but within one: else each tile would be written again whenever
+# towers are found.
 rule write_tile:
     input:
         tile=lambda w: ancient(local(tile_of(w).path)),
         work=f"{R}/predict/{{survey}}/work/{{tile}}.work",
-        predictions=f"{R}/predict/{{survey}}/work/{{tile}}.predictions",
+        predictions=[
+            f"{R}/predict/{{survey}}/work/{{tile}}.predictions",
+            *(
+                f"{R}/predict/{{survey}}/observed/{name}/{{tile}}.predictions"
+                for name in settings.predict.observers
+            ),
+        ],
         near=near_tile,
     output:
         points=f"{R}/predict/{{survey}}/{{survey}}/{{tile}}.laz",
@@ -187,6 +304,7 @@ rule write_tile:
             PREDICT,
             input={"tile": tile_of(w).known},
             **given_system(w.survey),
+            **scheme_of(w.survey),
         ),
     message:
         "Writing tile {wildcards.tile} of {wildcards.survey}"
@@ -198,7 +316,10 @@ rule survey_lists:
     input:
         works=work_files("work"),
         predictions=work_files("predictions"),
+        observed=observed_by_all,
         towers=f"{R}/predict/{{survey}}/work/towers.json",
+        line=of_line("line.json"),
+        clearances=of_line("clearances.json"),
         points=lambda w: [
             f"{R}/predict/{w.survey}/{w.survey}/{t}.laz" for t in written_tiles(w.survey)
         ],
@@ -206,7 +327,9 @@ rule survey_lists:
             f"{R}/predict/{w.survey}/work/{tile}.written.json" for tile in written_tiles(w.survey)
         ],
         model=champion_file(settings.predict.model),
+        observers=observer_files(),
     output:
+        **line_tables(),
         geopackage=f"{R}/predict/{{survey}}/{{survey}}.gpkg",
         geojson=in_report(
             f"{R}/predict/{{survey}}/{{survey}}.towers.geojson",
@@ -245,6 +368,7 @@ rule survey_lists:
             detection=SETTINGS["detection"],
             survey=PLANS[w.survey].survey.to_json(),
             input={"survey": [tile.known for tile in PLANS[w.survey].tiles.values()]},
+            **classes_of(w.survey),
         ),
     message:
         "Writing the lists of {wildcards.survey}"

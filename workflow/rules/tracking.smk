@@ -46,6 +46,13 @@ rule track:
         models=every("tune", "model"),
         scores=every("evaluate", "scores"),
         boosted_trees=every("boosted_trees", "scores"),
+        observers=[
+            *every("train_observer", "history"),
+            *every("train_observer", "provenance"),
+            *every("tune_observer", "tuning"),
+            *every("tune_observer", "model"),
+            *every("evaluate_observer", "scores"),
+        ],
     output:
         runs=f"{R}/mlflow/runs.json",
         provenance=f"{R}/mlflow/provenance.json",
@@ -68,8 +75,16 @@ rule track:
             common_settings={
                 model.name: {"voxels": SETTINGS["voxels"], "split": SETTINGS["split"]}
                 for model in settings.models
+            }
+            | {
+                observer.name: {
+                    "voxels": observer.grid().model_dump(mode="json"),
+                    "square": observer.square.model_dump(mode="json"),
+                    "split": SETTINGS["split"],
+                }
+                for observer in settings.observers
             },
-            results=results_of(),
+            results=results_of(observers=VALUES["observer"]),
             pictures=model_figures(),
         ),
     message:

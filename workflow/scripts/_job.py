@@ -30,7 +30,7 @@ THREAD_VARIABLES = (
 
 NOT_RECORDED = (
     *("store", "stores", "crop_stores", "towers_record"),
-    *("works", "predictions", "points"),
+    *("works", "predictions", "observed", "wires", "points"),
 )
 """Inputs without a fingerprint in the record: a manifest has the digest of its store, and the
 record of the labelled towers describes a table that is an input with a fingerprint. The work files

@@ -1,4 +1,4 @@
-"""Classify a survey and list its towers."""
+"""Classify a survey, list its towers and measure its lines."""
 
 from pathlib import Path
 
@@ -6,7 +6,9 @@ import _job
 
 
 def predict(job: _job.Job) -> None:
+    from scenenet.clearance.settings import ClearanceSettings
     from scenenet.detection.settings import DetectionSettings
+    from scenenet.pointcloud.class_schemes import class_scheme
     from scenenet.pointcloud.las.crs import named_system
     from scenenet.pointcloud.reading import survey_of_lengths
     from scenenet.prediction.result_files import PredictionFiles, require_space
@@ -15,17 +17,24 @@ def predict(job: _job.Job) -> None:
     from scenenet.prediction.writers import predict_to_files
 
     survey, output = Path(job.input.survey), job.output
-    given = job.identity.get("crs")
+    given, codes = job.identity.get("crs"), job.identity.get("codes")
     crs = None if given is None else named_system(given)
+    models = [job.input.model, *job.input.observers]
     lists = (Path(output[name]) for name in ("geopackage", "geojson", "table", "summary", "page"))
-    files = PredictionFiles({survey: Path(output.points)}, *lists)
-    require_space([(files, {survey: survey_of_lengths(survey, crs).n_points})])
+    tables = None
+    if codes is not None:
+        tables = Path(output.spans), Path(output.conductors), Path(output.clearances)
+    files = PredictionFiles({survey: Path(output.points)}, *lists, line_tables=tables)
+    points = survey_of_lengths(survey, crs).n_points
+    require_space([(files, {survey: points})], len(models))
     predict_to_files(
         SurveyFiles.of(survey, crs),
-        job.input.model,
+        models,
         files,
         PredictSettings(**job.settings),
         DetectionSettings(**job.identity["detection"]),
+        scheme=None if codes is None else class_scheme(codes),
+        clearance=None if codes is None else ClearanceSettings(**job.identity["clearance"]),
     )
 
 

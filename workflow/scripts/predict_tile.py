@@ -6,6 +6,7 @@ import _job
 def predict_tile(job: _job.Job) -> None:
     from scenenet.core.files import read_json
     from scenenet.prediction.jobs import predict_tile as stage
+    from scenenet.prediction.settings import PredictSettings
 
     fullest = [read_json(path)["points"] for path in job.input.fullest]
     stage.predict_tile(
@@ -15,6 +16,7 @@ def predict_tile(job: _job.Job) -> None:
         job.output.predictions,
         job.identity["within"],
         fullest[0] if fullest else None,
+        PredictSettings(**job.settings),
     )
 
 

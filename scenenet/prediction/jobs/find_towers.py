@@ -8,7 +8,7 @@ from pathlib import Path
 from scenenet.core.files import atomic, write_json
 from scenenet.detection.settings import DetectionSettings
 from scenenet.prediction.found_towers import TowerSearch, find_in_survey
-from scenenet.prediction.jobs.joined import joined_predictions, joined_work
+from scenenet.prediction.jobs.joined import joined_predictions, joined_work, usable
 from scenenet.prediction.survey_files import SurveyFiles, result_name
 
 
@@ -42,12 +42,10 @@ def find_towers_of(
     search = TowerSearch(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
     found = find_in_survey(search, f"{survey.name}: candidates measured")
     write_json(towers, found.to_json())
-    usable = {file.name for file in joined.files if file.error is None}
     with atomic(near) as folder:
         folder.mkdir()
-        for work in joined.used:
-            if work.file.name in usable:
-                codes = work.blocks.codes("voxels")
-                own = found.structures.reaching(work.lattice, codes)
-                facts = {"system": joined.system.to_json(), "structures": own.to_json()}
-                write_json(folder / f"{result_name(work.file.name)}.json", facts)
+        for work in usable(joined):
+            codes = work.blocks.codes("voxels")
+            own = found.structures.reaching(work.lattice, codes)
+            facts = {"system": joined.system.to_json(), "structures": own.to_json()}
+            write_json(folder / f"{result_name(work.file.name)}.json", facts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from scenenet.prediction.survey_files import SurveyFiles
@@ -10,6 +10,7 @@ from scenenet.prediction.work.block_file import BlockFile
 from scenenet.prediction.work.survey_work import SurveyWork
 from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tile_predictor import fullest_voxel
+from scenenet.prediction.work.work_file import WorkFile
 
 
 def joined_work(survey: SurveyFiles, works: Sequence[str | Path]) -> SurveyWork:
@@ -33,6 +34,12 @@ def joined_predictions(joined: SurveyWork, predictions: Sequence[str | Path]) ->
     used = {work.file.path for work in joined.used}
     each = zip(paths, predictions, strict=True)
     return TilePredictions([BlockFile(file) for path, file in each if path in used])
+
+
+def usable(joined: SurveyWork) -> Iterator[WorkFile]:
+    """The work files of the files of a survey that can be used."""
+    names = {file.name for file in joined.files if file.error is None}
+    return (work for work in joined.used if work.file.name in names)
 
 
 def fullest_in(survey: SurveyFiles, works: Sequence[str | Path], model: str | Path) -> int:

@@ -14,7 +14,7 @@ from scenenet.prediction.work.tile_predictor import (
     observed_voxel_size,
     predict_file,
 )
-from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.tiling import Lattice, Layer, TileSpool
 from scenenet.prediction.work.work_file import WorkFile
 
 
@@ -31,6 +31,26 @@ def model_voxel_size(model: str | Path, settings: PredictSettings) -> float:
     return observed_voxel_size(trained, card, settings)
 
 
+def further_voxel_sizes(
+    observers: Sequence[tuple[float, float | None]], size: float, settings: PredictSettings
+) -> list[float]:
+    """m, edges of further voxels in which observers observe surveys, known before they are trained.
+
+    Args:
+        observers: of each the voxel size of its crops, and the edge of the blocks that it observes
+            (``MetricSettings.observed``), both in m; None for kernels in voxels.
+        size: m, edge of the voxels of the model of towers.
+        settings: of the prediction.
+    """
+    from scenenet.convolution.coarsening import block_edge
+
+    found = []
+    for trained, observed in observers:
+        fine = settings.voxel_size or trained
+        found.append(fine if observed is None else fine * block_edge(fine, observed))
+    return [each for each in dict.fromkeys(found) if each != size]
+
+
 def predict_tile(
     work: str | Path,
     neighbours: Sequence[str | Path],
@@ -38,6 +58,7 @@ def predict_tile(
     out: str | Path,
     within: float,
     fullest: int | None,
+    settings: PredictSettings,
 ) -> None:
     """Predict a file of a survey, with its neighbours as surroundings.
 
@@ -49,6 +70,7 @@ def predict_tile(
         within: that distance, m.
         fullest: points in the fullest voxel of the survey (``fullest_in``), for a model that
             measures density; None for others.
+        settings: of the prediction.
 
     Raises:
         InputError: the distance is too small for the voxels of the model, or the model cannot be
@@ -58,10 +80,11 @@ def predict_tile(
 
     trained, card = read_model(model)
     own = WorkFile.open(work)
-    needed = needed_around(trained, card, own.lattice.voxel_size)
+    size = observed_voxel_size(trained, card, settings)
+    needed = needed_around(trained, card, size)
     if needed > within:
         raise InputError(
-            f"voxels of {own.lattice.voxel_size:g} m need the tiles within {needed:.0f} m, and the "
+            f"voxels of {size:g} m need the tiles within {needed:.0f} m, and the "
             f"workflow takes those within {within:g} m for neighbours",
             file=model,
             remedy="Set predict.voxel_size to a smaller value, or predict the survey with "
@@ -82,5 +105,6 @@ def predict_tile(
         )
     near = [own, *map(WorkFile.open, neighbours)]
     same = [] if own.system is None else list(belonging(near, own.system))
-    spool = TileSpool(own.lattice, (each.blocks for each in same))
+    layer = None if size == own.lattice.voxel_size else Layer(size)
+    spool = TileSpool(Lattice(size), (each.blocks for each in same), layer)
     predict_file(own, spool, out, trained, card, fullest or 1)

@@ -14,6 +14,18 @@ PIECE_M = 20.0
 """m, pieces of a conductor that are looked up by their bounding boxes."""
 
 
+def columns_reached(conductor: Conductor, lattice: Lattice) -> set[tuple[int, int]]:
+    """(x, y) numbers of the columns of tiles that a conductor reaches into: those that the box
+    around a piece of it touches."""
+    curve, reach = conductor.catenary, conductor.tube
+    steps = np.linspace(0.0, 1.0, 2 + int(curve.length / PIECE_M))
+    columns = set()
+    for low, high in pairwise(curve.at_shares(steps)[:, :2]):
+        (west, south), (east, north) = np.minimum(low, high), np.maximum(low, high)
+        columns |= lattice.columns((west - reach, east + reach), (south - reach, north + reach))
+    return columns
+
+
 class ConductorOwners:
     """Says on which conductor a point lies."""
 
@@ -22,17 +34,7 @@ class ConductorOwners:
         self._lattice = lattice
         self._near: dict[tuple[int, int], list[Conductor]] = {}
         for conductor in conductors:
-            curve, reach = conductor.catenary, conductor.tube
-            # A column of tiles has the conductor if the box around a piece of it does.
-            steps = np.linspace(0.0, 1.0, 2 + int(curve.length / PIECE_M))
-            places = curve.at_shares(steps)[:, :2]
-            columns = set()
-            for low, high in pairwise(places):
-                (west, south), (east, north) = np.minimum(low, high), np.maximum(low, high)
-                columns |= lattice.columns(
-                    (west - reach, east + reach), (south - reach, north + reach)
-                )
-            for column in columns:
+            for column in columns_reached(conductor, lattice):
                 self._near.setdefault(column, []).append(conductor)
 
     def __call__(self, xyz: np.ndarray, codes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenenet.pointcloud.targets import Target
 from scenenet.prediction.work.block_file import BlockFile
-from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.tiling import Lattice, TileSpool
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
@@ -66,9 +67,25 @@ class TilePredictions:
             files: files of predictions by one model, at least one. Where two have the same tile,
                 they have the same values.
         """
-        self.geneos = tuple(files[0].facts["geneos"])
+        self._facts = files[0].facts
+        self.geneos = tuple(self._facts["geneos"])
         self._files = {code: file for file in files for code in file.codes("predictions")}
         self._cached = lru_cache(maxsize=64)(self.read)
+
+    @property
+    def target(self) -> Target:
+        """What the model finds."""
+        return Target.parse(self._facts["target"])
+
+    @property
+    def tau(self) -> float:
+        """Threshold of the model."""
+        return float(self._facts["tau"])
+
+    @property
+    def lattice(self) -> Lattice:
+        """Of the voxels."""
+        return Lattice(self._facts["voxel_size"])
 
     def read(self, code: int) -> TilePrediction:
         """The prediction of the tile with ``code``."""

@@ -75,7 +75,12 @@ def predict_file(
             for tile, (probability, shares) in zip(together, predicted, strict=True):
                 prediction = TilePrediction(tile.voxel, probability, shares)
                 blocks.add("predictions", code_of(tile.place), prediction.records())
-        blocks.end({"geneos": geneo_names(model)})
+        blocks.end({
+            "geneos": geneo_names(model),
+            "target": card.target,
+            "tau": card.threshold(),
+            "voxel_size": spool.voxel_size,
+        })  # fmt: skip
 
 
 def observed_voxel_size(model: VoxelModel, card: ModelCard, settings: PredictSettings) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
@@ -48,7 +50,8 @@ class DetectedVoxels:
 
     def mean(self, voxels: np.ndarray) -> np.ndarray:
         """(2,) m, mean position of voxels, weighted by their probabilities."""
-        return np.average(self.centres[voxels, :2], axis=0, weights=self.probability[voxels])
+        weight = self.probability[voxels].astype(float)
+        return (self.centres[voxels, :2] * weight[:, None]).sum(axis=0) / weight.sum()
 
     def tallest_first(self) -> np.ndarray:
         """Columns by their number of detected levels, neighbouring columns included, highest
@@ -63,6 +66,28 @@ class DetectedVoxels:
         return np.lexsort((self.columns[:, 1], self.columns[:, 0], -total, -levels))
 
 
+class DistinctPlaces:
+    """Positions in plan that are all further than ``SAME_M`` from one another.
+
+    They are kept in cells: a survey of 100 km has 100 000 candidates, each of which is compared
+    with those near it only.
+    """
+
+    def __init__(self) -> None:
+        self._cells: defaultdict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
+
+    def add(self, x: float, y: float) -> bool:
+        """Add a position in m; False, and nothing is added, where one of them is the same."""
+        i, j = math.floor(x / SAME_M), math.floor(y / SAME_M)
+        for a in (i - 1, i, i + 1):
+            for b in (j - 1, j, j + 1):
+                for other in self._cells.get((a, b), ()):
+                    if math.hypot(x - other[0], y - other[1]) <= SAME_M:
+                        return False
+        self._cells[i, j].append((x, y))
+        return True
+
+
 def axes(
     detected: DetectedVoxels, settings: DetectionSettings, apart: float
 ) -> Iterator[np.ndarray]:
@@ -70,24 +95,34 @@ def axes(
 
     Axes with more levels come first, and each axis starts at least ``apart`` m from all before it.
     """
-    found: list[np.ndarray] = []
+    found = DistinctPlaces()
     taken = np.zeros(len(detected.columns), bool)
     for column in detected.tallest_first():
         if taken[column]:
             continue
-        axis = detected.columns[column]
-        for _ in range(MEAN_SHIFTS):
-            body = detected.within(axis, settings.eps / 2)
-            axis = detected.mean(body)
+        body, axis = _mean_shift(detected, detected.columns[column], settings.eps / 2)
         taken[detected.columns_within(axis, apart)] = True
         taken[column] = True
         extent = np.ptp(detected.centres[body, 2]) + detected.voxel_size
         if len(body) < settings.min_voxels or extent < settings.min_body:
             continue
         # The mean of neighbouring columns is often the same.
-        if not found or (np.hypot(*(np.array(found) - axis).T) > SAME_M).all():
-            found.append(axis)
+        if found.add(*axis.tolist()):
             yield axis
+
+
+def _mean_shift(
+    detected: DetectedVoxels, axis: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The voxels within a radius in m around an axis (2,) m that has moved to their mean, and the
+    axis."""
+    body = np.empty(0, np.int64)
+    for _ in range(MEAN_SHIFTS):
+        nearer = detected.within(axis, radius)
+        if np.array_equal(nearer, body):
+            break
+        body, axis = nearer, detected.mean(nearer)
+    return body, axis
 
 
 def neighbours_adjacent(axes: Iterable[np.ndarray]) -> list[np.ndarray]:

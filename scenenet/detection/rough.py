@@ -11,9 +11,9 @@ import numpy as np
 
 from scenenet.detection.body import centre_body, measure_body
 from scenenet.detection.candidates import (
-    SAME_M,
     SURROUNDINGS_M,
     DetectedVoxels,
+    DistinctPlaces,
     axes,
     neighbours_adjacent,
 )
@@ -55,12 +55,11 @@ def rough_towers(
     Axes are half of ``settings.eps`` apart, so a tower may have several.
     """
     found: list[RoughTower] = []
+    places = DistinctPlaces()
     for axis in neighbours_adjacent(axes(detected, settings, settings.eps / 2)):
         around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
         tower = _measure(detected, axis, around, settings)
-        if tower is not None and all(
-            np.hypot(tower.x - other.x, tower.y - other.y) > SAME_M for other in found
-        ):
+        if tower is not None and places.add(tower.x, tower.y):
             found.append(tower)
     return found
 

@@ -95,6 +95,20 @@ hardly narrower. Amid narrower ones is a tree under the line."""
 OPPOSITE = 120.0
 """degrees; two spans further apart than this are the two sides of one line."""
 
+# A conductor bends where it is carried.
+
+BEND = 0.015
+"""Half the change of its slope, or of its direction, m per m, up to which a conductor passes
+without a bend. On level ground it is the length of the spans over twice the catenary parameter: .05
+to .1 in most lines, and .015 for spans of 60 m pulled as tight as 2000 m."""
+
+BEND_WIRE_M = 0.5
+"""m across and up within which points are on the same conductor; the next one is a metre away."""
+
+SHORTEST_SPAN_M = 25.0
+"""m along the line between two towers that are wider than a pole. A tree near a tower stands where
+the conductors already bend."""
+
 # A conductor leads to the next support or to the edge of the data.
 
 FURTHEST_M = 60.0

@@ -7,11 +7,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenenet.core.progress import track
+from scenenet.detection.bends import pass_without_bend
 from scenenet.detection.candidates import SURROUNDINGS_M, DetectedVoxels
-from scenenet.detection.conductor_rules import FAR, FURTHEST_M, HEAD, WIDE, WIDEST_HEAD_M
+from scenenet.detection.conductor_rules import (
+    FAR,
+    FURTHEST_M,
+    HEAD,
+    POLE_M,
+    WIDE,
+    WIDEST_HEAD_M,
+)
 from scenenet.detection.conductors import ConductorPoints, Span
+from scenenet.detection.distinct import distinct_towers, same_axis
 from scenenet.detection.following import leads_on
 from scenenet.detection.measure_structure import measure_structure
+from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.rough import RoughTower, rough_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.structure import BodyTests, Structure
@@ -20,64 +30,8 @@ from scenenet.detection.surroundings import Surroundings
 MIN_FREE = 1 / 3
 """Smallest share of the levels at which the body stands free, by points."""
 
-APART_M = 2.0
-"""m, smallest distance between two towers, measured in points."""
-
 AHEAD = 6
 """Number of rough towers ahead of the one that is measured at which conductors are looked for."""
-
-
-@dataclass(frozen=True)
-class MeasuredTower:
-    """A tower, measured in points.
-
-    Attributes:
-        x, y: m, centre of its body.
-        base: m, elevation of the ground at its axis.
-        height: m, from the base to its top.
-        width: m, of its body where it stands free.
-        free: share of the levels at which its body stands free.
-        upright: share of the levels from foot to top with a point of its body.
-        spans: directions in which conductors leave, the longest first.
-        probability: highest probability of its voxels.
-        voxels: rows of its detected voxels in the arguments of ``find_towers``.
-        structure: its shape, which says which points are its own.
-    """
-
-    x: float
-    y: float
-    base: float
-    height: float
-    width: float
-    free: float
-    upright: float
-    spans: tuple[Span, ...]
-    probability: float
-    voxels: np.ndarray
-    structure: Structure
-
-    @classmethod
-    def of(cls, rough: RoughTower, structure: Structure, spans: tuple[Span, ...]) -> MeasuredTower:
-        """A tower that was found at a rough one, with the conductors that lead on."""
-        return cls(
-            x=structure.x,
-            y=structure.y,
-            base=structure.ground.elevation,
-            height=structure.height,
-            width=structure.profile.width,
-            free=structure.profile.free,
-            upright=structure.upright,
-            spans=spans,
-            probability=rough.probability,
-            voxels=rough.voxels,
-            structure=structure,
-        )
-
-    def moved(self, offset: np.ndarray) -> MeasuredTower:
-        """The same tower elsewhere; ``offset`` is (3,) m."""
-        x, y, z = offset.tolist()
-        structure = self.structure.moved(x, y, z)
-        return replace(self, x=self.x + x, y=self.y + y, base=self.base + z, structure=structure)
 
 
 def find_towers(
@@ -117,7 +71,7 @@ def find_towers(
         for coming in rough[i : i + AHEAD]:
             measurement.expect(coming)
         found += measurement.towers_near(rough[i])
-    towers = [tower.moved(offset) for tower in _distinct(found)]
+    towers = distinct_towers([tower.moved(offset) for tower in found], points)
     return sorted(towers, key=lambda tower: (-tower.probability, tower.x, tower.y))
 
 
@@ -182,8 +136,12 @@ class _Measurement:
             spans = self._leading_on(shape)
             if not replace(shape, spans=spans).carries(needed):
                 continue
-            if all(np.hypot(shape.x - other.x, shape.y - other.y) > APART_M for other in found):
-                found.append(MeasuredTower.of(rough, shape, spans))
+            wide = shape.profile.width > POLE_M
+            if wide and pass_without_bend(spans, np.array([shape.x, shape.y])):
+                continue
+            tower = MeasuredTower.of(rough, shape, spans)
+            if not any(same_axis(tower, other) for other in found):
+                found.append(tower)
         return found
 
     def _widest(self, rough: RoughTower) -> float:
@@ -195,16 +153,3 @@ class _Measurement:
         place, base = np.array([shape.x, shape.y]), shape.ground.elevation
         far = self.surroundings(place + self.offset[:2], FURTHEST_M + FAR) - self.offset
         return tuple(s for s in shape.spans if leads_on(s, place, base, far, self.voxel_size))
-
-
-def _distinct(found: list[MeasuredTower]) -> list[MeasuredTower]:
-    """One tower for each structure: several axes may have led to it."""
-    towers: list[MeasuredTower] = []
-    for tower in sorted(found, key=lambda t: (-t.free * t.upright * t.height, t.x, t.y)):
-        wide = tower.width / 2
-        if all(
-            np.hypot(tower.x - t.x, tower.y - t.y) > max(APART_M, wide + t.width / 2)
-            for t in towers
-        ):
-            towers.append(tower)
-    return towers

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
-from scenenet.detection.find import MeasuredTower, find_towers
+from scenenet.detection.find import find_towers
+from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in
 from scenenet.detection.survey_tower import SurveyTower

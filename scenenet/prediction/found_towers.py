@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from scenenet.detection.edge_distance import MAX_M, edge_distance
-from scenenet.detection.find import MeasuredTower, find_towers
+from scenenet.detection.find import find_towers
+from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.detection.tower_ids import tower_ids

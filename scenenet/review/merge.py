@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scenenet.core.errors import InputError
-from scenenet.detection.find import APART_M
+from scenenet.detection.distinct import APART_M
 from scenenet.detection.tower_ids import EAST, NORTH, tower_ids
 from scenenet.metrics.tower_matching import HIT_DISTANCE_M
 from scenenet.review.decisions import Decision, Said, Statements

@@ -123,3 +123,28 @@ def test_below_tau_conductors_have_to_leave_in_two_directions(tower_scene):
 def test_nothing_detected_is_no_tower(tower_scene):
     scene = tower_scene("tubular", 18.0)
     assert find(scene.xyz, []) == []
+
+
+def under_conductors(bend):
+    """A slender crown of 15 m amid three conductors that have a ``bend`` above it, m per m."""
+    rng = np.random.default_rng(7)
+    turn, z = rng.uniform(0, 2 * np.pi, 1500), rng.uniform(0.5, 15, 1500)
+    wide = 1.5 * np.sqrt(rng.uniform(0, 1, 1500))
+    parts = [np.column_stack([wide * np.cos(turn), wide * np.sin(turn), z])]
+    s = np.arange(-28, 28, 0.25)
+    for t in (-2.5, 0.0, 2.5):
+        height = 14.6 + s**2 / 2000 - bend / 2 * np.abs(s)
+        parts.append(np.column_stack([np.full(len(s), t), s, height]))
+    ground = rng.uniform(-28, 28, (20_000, 2))
+    ground = ground[np.hypot(*ground.T) <= 28]
+    parts.append(np.column_stack([ground, np.zeros(len(ground))]))
+    xyz = np.concatenate(parts)
+    return xyz + 0.02 * rng.standard_normal(xyz.shape) + FOOT
+
+
+FOOT = np.array([1000.3, 2000.7, 50.0])
+
+
+def test_a_tree_that_conductors_pass_without_a_bend_is_no_tower():
+    assert len(find(under_conductors(0.15), [FOOT], height=14)) == 1
+    assert find(under_conductors(0.0), [FOOT], height=14) == []

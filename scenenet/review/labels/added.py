@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from scenenet.detection.conductor_rules import FAR, FURTHEST_M
-from scenenet.detection.find import MeasuredTower, find_towers
+from scenenet.detection.find import find_towers
+from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in
 from scenenet.metrics.tower_matching import HIT_DISTANCE_M

@@ -12,7 +12,7 @@ import numpy as np
 from scenenet.core.errors import InputError
 from scenenet.core.progress import track
 from scenenet.core.unchanged import FileState
-from scenenet.detection.find import MeasuredTower
+from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.pointcloud import add_dimensions
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.prediction.point_dimensions import TOWER_ID

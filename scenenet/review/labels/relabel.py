@@ -9,7 +9,7 @@ import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.dataset.labelled_towers import TowerSettings, cluster
-from scenenet.detection.find import MeasuredTower
+from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.metrics.tower_matching import HIT_DISTANCE_M
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.review.labels.points import Points

@@ -1,0 +1,92 @@
+"""One tower for each structure, of all that candidate axes led to."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from scenenet.detection.conductor_rules import BESIDE_M, POLE_M, SHORTEST_SPAN_M
+from scenenet.detection.joined import PLANE_M, joined, tower_of
+from scenenet.detection.line_frame import across, sides_of
+from scenenet.detection.measured_tower import MeasuredTower
+from scenenet.detection.surroundings import Surroundings
+
+APART_M = 2.0
+"""m, smallest distance between two towers, measured in points."""
+
+
+def same_axis(one: MeasuredTower, other: MeasuredTower) -> bool:
+    """Whether two axes are too close for two towers of any width."""
+    return bool(np.hypot(one.x - other.x, one.y - other.y) <= APART_M)
+
+
+def distinct_towers(found: list[MeasuredTower], points: Surroundings) -> list[MeasuredTower]:
+    """One tower for each structure: several axes may have led to its body, and to its legs.
+
+    Args:
+        found: those that the axes led to.
+        points: gives the points around a position.
+    """
+    bodies: list[MeasuredTower] = []
+    for tower in sorted(found, key=_best_first):
+        if not any(_same_body(tower, other) for other in bodies):
+            bodies.append(tower)
+    towers: list[MeasuredTower] = []
+    for tower in sorted(map(_whole, _joined(bodies, points)), key=lambda t: (-t.height, t.x, t.y)):
+        if not any(_under_conductors(tower, other) for other in towers):
+            towers.append(tower)
+    return towers
+
+
+def _best_first(tower: MeasuredTower) -> tuple[float, float, float]:
+    """The key that sorts the body that stands most free first."""
+    return -tower.free * tower.upright * tower.height, tower.x, tower.y
+
+
+def _same_body(one: MeasuredTower, other: MeasuredTower) -> bool:
+    """Whether two bodies are in one another."""
+    apart = one.width / 2 + other.width / 2
+    return same_axis(one, other) or bool(np.hypot(one.x - other.x, one.y - other.y) <= apart)
+
+
+def _joined(bodies: list[MeasuredTower], points: Surroundings) -> list[list[MeasuredTower]]:
+    """The bodies of each tower: one, or several that beams join."""
+    towers: list[list[MeasuredTower]] = []
+    for body in bodies:
+        # A leg may be joined to the body amid the conductors and to the other leg.
+        own, rest = [body], []
+        for tower in towers:
+            part = any(joined(body.structure, other.structure, points) for other in tower)
+            if part:
+                own += tower
+            else:
+                rest.append(tower)
+        towers = [*rest, own]
+    return towers
+
+
+def _whole(parts: list[MeasuredTower]) -> MeasuredTower:
+    """The tower to which joined bodies belong."""
+    if len(parts) == 1:
+        return parts[0]
+    shape = tower_of([part.structure for part in parts])
+    nearest = min(parts, key=lambda part: np.hypot(part.x - shape.x, part.y - shape.y))
+    base = shape.ground.elevation
+    return replace(nearest, x=shape.x, y=shape.y, base=base, height=shape.height, structure=shape)
+
+
+def _under_conductors(tower: MeasuredTower, other: MeasuredTower) -> bool:
+    """Whether what seems to be a tower stands under the conductors of another that is near.
+
+    Towers side by side, in one plane across their lines, may be as near as they like.
+    """
+    along = other.structure.along
+    offset = np.array([tower.x - other.x, tower.y - other.y])
+    sides = sides_of(other.spans, along)
+    right = float(offset @ across(along))
+    return (
+        tower.width > POLE_M
+        and PLANE_M < abs(offset @ along) <= SHORTEST_SPAN_M
+        and min(sides, default=0.0) - BESIDE_M <= right <= max(sides, default=0.0) + BESIDE_M
+    )

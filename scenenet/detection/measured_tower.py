@@ -1,0 +1,64 @@
+"""A tower, measured in points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from scenenet.detection.conductors import Span
+from scenenet.detection.rough import RoughTower
+from scenenet.detection.structure import Structure
+
+
+@dataclass(frozen=True)
+class MeasuredTower:
+    """A tower, measured in points.
+
+    Attributes:
+        x, y: m, centre of its body.
+        base: m, elevation of the ground at its axis.
+        height: m, from the base to its top.
+        width: m, of its body where it stands free.
+        free: share of the levels at which its body stands free.
+        upright: share of the levels from foot to top with a point of its body.
+        spans: directions in which conductors leave, the longest first.
+        probability: highest probability of its voxels.
+        voxels: rows of its detected voxels in the arguments of ``find_towers``.
+        structure: its shape, which says which points are its own.
+    """
+
+    x: float
+    y: float
+    base: float
+    height: float
+    width: float
+    free: float
+    upright: float
+    spans: tuple[Span, ...]
+    probability: float
+    voxels: np.ndarray
+    structure: Structure
+
+    @classmethod
+    def of(cls, rough: RoughTower, structure: Structure, spans: tuple[Span, ...]) -> MeasuredTower:
+        """A tower that was found at a rough one, with the conductors that lead on."""
+        return cls(
+            x=structure.x,
+            y=structure.y,
+            base=structure.ground.elevation,
+            height=structure.height,
+            width=structure.profile.width,
+            free=structure.profile.free,
+            upright=structure.upright,
+            spans=spans,
+            probability=rough.probability,
+            voxels=rough.voxels,
+            structure=structure,
+        )
+
+    def moved(self, offset: np.ndarray) -> MeasuredTower:
+        """The same tower elsewhere; ``offset`` is (3,) m."""
+        x, y, z = offset.tolist()
+        structure = self.structure.moved(x, y, z)
+        return replace(self, x=self.x + x, y=self.y + y, base=self.base + z, structure=structure)

@@ -211,11 +211,12 @@ def _runs(bearing: np.ndarray, s: np.ndarray) -> Iterator[tuple[float, float, np
         seen = np.zeros((len(middles), metre.max() + 1), bool)
         seen[sectors, metre[points]] = True
         count = np.bincount(sectors, minlength=len(middles))
-        runs = zip(map(_longest_run, seen), count.tolist(), (-middles).tolist(), strict=True)
-        length, _, negative = max(runs)
+        lengths = _longest_runs(seen)
+        longest = int(np.lexsort((-middles, count, lengths))[-1])
+        length = float(lengths[longest])
         if length < MIN_LENGTH:
             return
-        angle = _angle(bearing, -negative)
+        angle = _angle(bearing, float(middles[longest]))
         members = left & (angle <= SECTOR)
         radians = np.radians(bearing[members])
         mean = np.degrees(np.arctan2(np.sin(radians).mean(), np.cos(radians).mean())) % 360
@@ -233,11 +234,12 @@ def _angle(bearing: np.ndarray, middle: float | np.ndarray) -> np.ndarray:
     return np.abs((bearing - middle + 180) % 360 - 180)
 
 
-def _longest_run(seen: np.ndarray, gap: float = GAP) -> float:
-    """m, longest stretch of the metres (M,) bool that are seen, without a gap over ``gap`` m."""
-    metres = np.flatnonzero(seen)
-    if len(metres) == 0:
-        return 0.0
-    breaks = np.flatnonzero(np.diff(metres) > gap)
-    first, last = metres[np.append(0, breaks + 1)], metres[np.append(breaks, -1)]
-    return float((last - first).max() + 1)
+def _longest_runs(seen: np.ndarray) -> np.ndarray:
+    """(R,) m, longest stretch of the metres (R, M) bool that are seen, without a gap over ``GAP``
+    m."""
+    metre = np.arange(seen.shape[1])
+    before = np.maximum.accumulate(np.where(seen, metre, -np.inf), axis=1)
+    before = np.column_stack([np.full(len(seen), -np.inf), before[:, :-1]])
+    starts = np.where(seen & (metre - before > GAP), metre, -1)
+    length = metre - np.maximum.accumulate(starts, axis=1) + 1
+    return np.asarray(np.where(seen, length, 0).max(axis=1, initial=0))

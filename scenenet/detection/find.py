@@ -114,10 +114,16 @@ class _Measurement:
         needed = settings.min_conductor * (1 if rough.probability >= self.tau else 2)
         found: list[MeasuredTower] = []
 
+        # The first question is asked again where the axis is looked for amid the conductors.
+        known: dict[tuple[float, ...], list[Span]] = {}
+
         def leaving(axis: np.ndarray, base: float, height: float, crossarm: float) -> list[Span]:
-            place, foot = axis + offset[:2], base + offset[2]
-            spans = self.conductors.leaving(place, foot, height, crossarm, self.surroundings)
-            return [replace(span, places=span.places - offset) for span in spans]
+            question = *axis.tolist(), base, height, crossarm
+            if question not in known:
+                place, foot = axis + offset[:2], base + offset[2]
+                spans = self.conductors.leaving(place, foot, height, crossarm, self.surroundings)
+                known[question] = [replace(span, places=span.places - offset) for span in spans]
+            return known[question]
 
         # The cheapest test first: most trees have no conductor anywhere near.
         widest = self._widest(rough)

@@ -34,6 +34,13 @@ def conductors() -> str:
     return _table("column", ((c.name, c.unit, c.description) for c in CONDUCTOR_COLUMNS))
 
 
+def supports() -> str:
+    """Every column of the list of towers of lines."""
+    from scenenet.line.records import SUPPORT_COLUMNS
+
+    return _table("column", ((c.name, c.unit, c.description) for c in SUPPORT_COLUMNS))
+
+
 def line_notes() -> str:
     """Every column of the list of places to look at."""
     from scenenet.line.records import NOTE_COLUMNS
@@ -112,6 +119,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "tower list": tower_list,
     "spans": spans,
     "conductors": conductors,
+    "supports": supports,
     "line notes": line_notes,
     "clearances by span": span_clearances,
     "clearances": clearances,

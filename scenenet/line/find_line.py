@@ -20,6 +20,7 @@ from scenenet.line.records import (
     SurveyLine,
 )
 from scenenet.line.spans import find_spans
+from scenenet.line.supports import supports
 from scenenet.line.wire_points import WirePoints
 
 PHASES = 3
@@ -108,7 +109,8 @@ def find_line(
     notes += [
         LineNote(tower.x, tower.y, UNHELD, tower.id, 0) for tower in towers if tower.id not in held
     ]
-    return SurveyLine(tuple(spans), tuple(conductors), tuple(notes))
+    held_by = supports(towers, spans, conductors)
+    return SurveyLine(tuple(spans), tuple(conductors), tuple(notes), tuple(held_by))
 
 
 def _is_cable(spans: Sequence[TracedSpan], slack: float) -> bool:

@@ -43,6 +43,7 @@ class LineTower:
         id: in the tower list.
         x, y, base: m, its foot.
         height: m.
+        width: m, of its body at half its height; None if it is not known.
     """
 
     id: int
@@ -50,6 +51,7 @@ class LineTower:
     y: float
     base: float
     height: float
+    width: float | None = None
 
     @property
     def place(self) -> np.ndarray:

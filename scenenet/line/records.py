@@ -141,6 +141,32 @@ class LineNote(Record):
     span_id: int = column("", "number of the span that says it, 0 for none", heading="span")
 
 
+@dataclass(frozen=True)
+class Support(Record):
+    """A tower as the line shows it. ``SUPPORT_COLUMNS`` says what each column is."""
+
+    x: float = column("m", "easting")
+    y: float = column("m", "northing")
+    tower: int = column("", "id of the tower", heading="tower")
+    line: int = column("", "number of its line", heading="line")
+    spans: int = column("", "spans that it holds: 1 at the end of a line, more than 2 at a branch",
+                        heading="spans")  # fmt: skip
+    conductors: int = column(
+        "", "conductors of the span at it that has most; the next columns are of this span",
+        heading="conductors",
+    )  # fmt: skip
+    earth_wires: int = column("", "earth wires", heading="earth wires")
+    levels: str = column(
+        "", "conductors at each height, from the top: 3 is a horizontal arrangement, 1+2 a "
+        "triangle, 2+2+2 a double circuit on three crossarms", heading="levels",
+    )  # fmt: skip
+    lowest: float = column("m", "height of the lowest conductor above its foot", vertical=True)
+    highest: float = column("m", "height of the highest one", vertical=True)
+    body: str = column(
+        "", "pole, if it is less than 1 m wide at half its height, or lattice", heading="body"
+    )
+
+
 EXPECTED, UNHELD = "tower expected", "tower without a conductor"
 FOUND_AGAIN = "tower found where the line expected one"
 """What the line says of a place."""
@@ -150,6 +176,9 @@ CONDUCTOR_COLUMNS = columns_of(Conductor)
 
 SPAN_COLUMNS = columns_of(LineSpan)
 """Every column of the list of spans, in order."""
+
+SUPPORT_COLUMNS = columns_of(Support)
+"""Every column of the list of towers of lines, in order."""
 
 NOTE_COLUMNS = columns_of(LineNote)
 """Every column of the list of places to look at, in order."""
@@ -163,17 +192,20 @@ class SurveyLine:
         spans: line by line, each in order.
         conductors: span by span.
         notes: places to look at: expected towers, and towers without a conductor.
+        supports: the towers that are in a line.
     """
 
     spans: tuple[LineSpan, ...]
     conductors: tuple[Conductor, ...]
     notes: tuple[LineNote, ...]
+    supports: tuple[Support, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         return {
             "spans": [span.to_json() for span in self.spans],
             "conductors": [conductor.to_json() for conductor in self.conductors],
             "notes": [note.to_json() for note in self.notes],
+            "supports": [support.to_json() for support in self.supports],
         }
 
     @classmethod
@@ -183,4 +215,5 @@ class SurveyLine:
             tuple(map(LineSpan.from_json, data["spans"])),
             tuple(map(Conductor.from_json, data["conductors"])),
             tuple(map(LineNote.from_json, data["notes"])),
+            tuple(map(Support.from_json, data["supports"])),
         )

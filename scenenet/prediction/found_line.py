@@ -140,5 +140,6 @@ def _wire_points(wires: WireSearch, spool: TileSpool) -> WirePoints:
 def _in_metres(tower: SurveyTower, unit_sizes: tuple[float, float, float]) -> LineTower:
     planar, _, vertical = unit_sizes
     return LineTower(
-        tower.id, tower.x * planar, tower.y * planar, tower.base * vertical, tower.height * vertical
-    )
+        tower.id, tower.x * planar, tower.y * planar, tower.base * vertical,
+        tower.height * vertical, tower.width * planar,
+    )  # fmt: skip

@@ -11,6 +11,7 @@ from scenenet.line.records import (
     CONDUCTOR_COLUMNS,
     NOTE_COLUMNS,
     SPAN_COLUMNS,
+    SUPPORT_COLUMNS,
     SurveyLine,
 )
 from scenenet.prediction.record_files import RecordLayer, write_layers, write_table
@@ -48,8 +49,9 @@ def write_line_layers(
     crs: pyproj.CRS | None,
     sizes: tuple[float, float, float],
 ) -> list[str]:
-    """Add the layers ``spans`` (LineString), ``conductors`` (LineStringZ, along the wire) and
-    ``line_notes`` (Point: places to look at) to a GeoPackage; returns their names.
+    """Add the layers ``spans`` (LineString), ``conductors`` (LineStringZ, along the wire),
+    ``supports`` (Point: towers as the line shows them) and ``line_notes`` (Point: places to look
+    at) to a GeoPackage; returns their names.
 
     Args:
         sizes: as ``write_spans_csv``.
@@ -64,10 +66,12 @@ def write_line_layers(
         shares = np.linspace(0, 1, 2 + int(curve.length / DRAWN_M))
         xyz = curve.at_shares(shares) / (planar, planar, vertical)
         wires.append(shapely.LineString(xyz))
+    feet = [shapely.Point(support.x / planar, support.y / planar) for support in line.supports]
     places = [shapely.Point(note.x / planar, note.y / planar) for note in line.notes]
     layers = [
         RecordLayer("spans", "LineString", spans, line.spans, SPAN_COLUMNS),
         RecordLayer("conductors", "LineString Z", wires, line.conductors, CONDUCTOR_COLUMNS),
+        RecordLayer("supports", "Point", feet, line.supports, SUPPORT_COLUMNS),
         RecordLayer(NOTES, "Point", places, line.notes, NOTE_COLUMNS),
     ]
     return write_layers(path, layers, crs, sizes)

@@ -39,6 +39,15 @@ STYLES: Mapping[str, str] = {
         outline_color="255,255,255,255",
         size="3.4",
     ),
+    "supports": _style(
+        "marker",
+        "SimpleMarker",
+        LABELS.format(field="&quot;levels&quot;"),
+        name="square",
+        color="255,255,255,255",
+        outline_color="60,60,60,255",
+        size="1.8",
+    ),
     "line_notes": _style(
         "marker",
         "SimpleMarker",

@@ -18,7 +18,7 @@ from scenenet.experiments.components import run as components
 from scenenet.experiments.components.summary import summarise_components
 from scenenet.experiments.cross_validation.run import COLUMNS
 from scenenet.experiments.cross_validation.summary import summarise_folds
-from scenenet.line.records import CONDUCTOR_COLUMNS, NOTE_COLUMNS, SPAN_COLUMNS
+from scenenet.line.records import CONDUCTOR_COLUMNS, NOTE_COLUMNS, SPAN_COLUMNS, SUPPORT_COLUMNS
 from scenenet.prediction.point_dimensions import LINE_DIMENSIONS
 
 
@@ -59,6 +59,7 @@ def test_runs_and_table_of_the_parts_of_the_method_are_described(page):
     [
         ("SURVEY.spans.csv", SPAN_COLUMNS),
         ("SURVEY.conductors.csv", CONDUCTOR_COLUMNS),
+        ("SURVEY.gpkg, layer supports", SUPPORT_COLUMNS),
         ("SURVEY.gpkg, layer line_notes", NOTE_COLUMNS),
         ("SURVEY.clearances.csv", SPAN_CLEARANCE_COLUMNS),
         ("SURVEY.gpkg, layer clearances", CLEARANCE_COLUMNS),

@@ -26,8 +26,9 @@ def test_conductors_are_counted_by_the_crossarms_of_the_tower(kind):
         assert support.body == ("pole" if kind == "wooden" else "lattice")
         held = [c.catenary.start[2] - tower.base for c in known.conductors
                 if c.from_tower == tower.id and not c.is_earth_wire]  # fmt: skip
-        assert support.highest == pytest.approx(max(held), abs=0.2)
-        assert support.lowest == pytest.approx(min(held), abs=0.2)
+        # At the ends of the survey the direction of the crossarms is not known.
+        assert support.highest == pytest.approx(max(held), abs=0.6)
+        assert support.lowest == pytest.approx(min(held), abs=0.6)
     assert SurveyLine.from_json(line.to_json()) == line
 
 

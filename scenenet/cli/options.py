@@ -13,7 +13,7 @@ from scenenet.core.errors import InputError
 from scenenet.core.provided_code import KERNELS, MEASUREMENTS
 from scenenet.dataset import voxels
 from scenenet.models import settings
-from scenenet.models.packaged import packaged_model
+from scenenet.models.packaged import PACKAGED, named_model, packaged_model
 from scenenet.pointcloud.class_schemes import SCHEMES, difference
 from scenenet.pointcloud.targets import Target
 
@@ -105,11 +105,16 @@ Labelled = Annotated[
         help="Labelled surveys (LAS, LAZ, COPC), TS40K samples (.npy, .pt), or folders of samples."
     ),
 ]
+_MODEL_HELP = (
+    "Model file that scenenet train wrote (.json, .safetensors), or a model of the package: "
+    f"{' or '.join(PACKAGED)}."
+)
 ModelFile = Annotated[
     Path,
     typer.Option(
         "--model",
-        help="Model file that scenenet train wrote (.json, .safetensors).",
+        help=_MODEL_HELP,
+        callback=named_model,
         show_default="the model that comes with the package",
         default_factory=packaged_model,
     ),
@@ -118,8 +123,8 @@ ModelFiles = Annotated[
     list[Path],
     typer.Option(
         "--model",
-        help="Model file that scenenet train wrote (.json, .safetensors). Give one for each "
-        "target that you want to find.",
+        help=f"{_MODEL_HELP} Give one for each target that you want to find.",
+        callback=lambda given: [named_model(path) for path in given],
         show_default="the model that comes with the package",
         default_factory=lambda: [packaged_model()],
     ),

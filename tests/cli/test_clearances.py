@@ -9,7 +9,8 @@ import sqlite3
 import pytest
 from fixtures.scenes import model_card
 
-from scenenet.models.model_file import write_model
+from scenenet.models.model_file import read_model, write_model
+from scenenet.models.packaged import WIRES, packaged_model
 
 LIMITS = "voltage,ground,vegetation,building,wire\n30,5,2,3,2\n"
 
@@ -30,7 +31,7 @@ def said(done) -> str:
     ("options", "code", "problem"),
     [
         (("--limits", "limits.csv"), 2, "needs --voltage"),
-        (("--voltage", "66"), 2, "needs a model of towers and one of target wire"),
+        (("--voltage", "66"), 2, "or a model of towers and one of target wire"),
         (("--voltage", "1500"), 1, "there are no limits for 1500 kV"),
         (("--voltage", "66", "--limits", "limits.csv"), 1, "highest voltage of the table is 30 kV"),
         (("--voltage", "66", "--limits", "none.csv"), 1, "none.csv: cannot be read"),
@@ -71,3 +72,27 @@ def test_a_prediction_of_lines_has_clearances(call, pole_survey, pole_model, wir
         layers = {row[0] for row in database.execute("SELECT table_name FROM gpkg_contents")}
         styled = {row[0] for row in database.execute("SELECT f_table_name FROM layer_styles")}
     assert {"clearances", "fall_trees", "clearance_profile"} <= layers & styled
+
+
+def test_line_adds_the_model_of_wires_of_the_package_unless_one_is_named(
+    call, pole_survey, pole_model, wire_model, tmp_path
+):
+    def wires(*options):
+        done = call("predict", pole_survey, "--line", "--out", tmp_path / "out", "--json",
+                    "--min-conductor", "0", "--overwrite", *options)  # fmt: skip
+        assert done.code == 0, done.err
+        [summary] = json.loads(done.out)
+        assert summary["line"] is not None
+        tower, wire = summary["targets"]
+        return tower["model"], wire["tau"]
+
+    own = read_model(packaged_model(WIRES))[1].threshold()
+    assert wires("--model", pole_model) == ("by-hand", own)
+    assert wires("--model", pole_model, "--model", wire_model) == ("by-hand", 0.5)
+    assert (tmp_path / "out" / f"{pole_survey.stem}.spans.csv").exists()
+
+
+def test_a_model_of_the_package_has_a_name_and_lines_need_towers(call, pole_survey, tmp_path):
+    done = call("predict", pole_survey, "--line", "--model", "wires", "--out", tmp_path / "out")
+    assert done.code == 2
+    assert "needs a model of towers" in said(done)

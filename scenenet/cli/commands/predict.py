@@ -23,7 +23,7 @@ from scenenet.cli.options import (
     detection_settings,
 )
 from scenenet.cli.output import show
-from scenenet.models.packaged import packaged_model
+from scenenet.models.packaged import WIRES, packaged_model
 from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme, class_scheme
 from scenenet.pointcloud.targets import WIRE, Target
 
@@ -38,6 +38,7 @@ EXAMPLES = (
     "scenenet predict line.laz --out predicted",
     "scenenet predict tiles/ --out predicted",
     "scenenet predict surveys/*.laz --model model.json --out predicted --json",
+    "scenenet predict line.laz --line --out predicted",
     "scenenet predict line.laz --model model.json --model wire.json --out predicted",
 )
 
@@ -49,6 +50,14 @@ def command(
     surveys: Surveys,
     model: ModelFiles,
     out: Annotated[Path, typer.Option("--out", help="Folder for the results.")],
+    line: Annotated[
+        bool,
+        typer.Option(
+            "--line",
+            help="Find spans and conductors and measure clearances too, with the model of wires "
+            "that comes with the package unless --model names one of target wire.",
+        ),
+    ] = False,
     voxel_size: Annotated[
         float | None,
         typer.Option(
@@ -63,16 +72,16 @@ def command(
         bool,
         typer.Option(
             "--classify",
-            help="Give the points of towers the class code 15 (schemes asprs, edp), and with a "
-            "model of target wire the points of wires that of --codes.",
+            help="Give the points of towers the class code 15 (schemes asprs, edp), and with "
+            "--line or a model of target wire the points of wires that of --codes.",
         ),
     ] = False,
     codes: Annotated[
         Codes | None,
         typer.Option(
             "--codes",
-            help="Class scheme of the survey, with a model of target wire: its classes say what is "
-            "near the conductors, and with --classify wires get its code "
+            help="Class scheme of the survey, with --line or a model of target wire: its classes "
+            "say what is near the conductors, and with --classify wires get its code "
             f"({_WIRE_CODES}).",
         ),
     ] = None,
@@ -89,8 +98,8 @@ def command(
         typer.Option(
             metavar="KV",
             min=0.1,
-            help="With models of towers and wires: nominal voltage of the lines in kV, by which "
-            "limits for clearances are chosen.  [default: no limits]",
+            help="With --line, or models of towers and wires: nominal voltage of the lines in kV, "
+            "by which limits for clearances are chosen.  [default: no limits]",
         ),
     ] = None,
     limits: Annotated[
@@ -130,12 +139,13 @@ def command(
     probability, in the units of the survey. GeoJSON is in longitude and latitude where the CRS is
     known.
 
-    NAME.spans.csv, NAME.conductors.csv: with a model of towers and one of wires, the spans in order
-    along each line, and every conductor with its catenary, sag and attachments. NAME.gpkg then has
-    the layers spans, conductors and line_notes, and each point the numbers of its span and
-    conductor. Positions are those of the flight, not those at another temperature, load or wind.
+    NAME.spans.csv, NAME.conductors.csv: with --line, or a model of towers and one of wires, the
+    spans in order along each line, and every conductor with its catenary, sag and attachments.
+    NAME.gpkg then has the layers spans, conductors and line_notes, and each point the numbers of
+    its span and conductor. Positions are those of the flight, not those at another temperature,
+    load or wind.
 
-    NAME.clearances.csv: with these models, a row per span, the worst first: how near ground,
+    NAME.clearances.csv: with these options, a row per span, the worst first: how near ground,
     vegetation, buildings and other wires are to its conductors, and with --voltage how many places
     are closer than the limits. NAME.gpkg then has the layers clearances,
     clearance_profile and fall_trees.
@@ -172,18 +182,24 @@ def command(
     clearance = _clearance(voltage, limits)
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
-    towers, line = model == [packaged_model()], False
-    if named and not towers:  # it loads torch, which takes seconds
+    towers, lines = model == [packaged_model()], False
+    if named and (line or not towers):  # it loads torch, which takes seconds
         used = use_models(model, settings, scheme)
+        if line and not any(each.target.name == WIRE for each in used):
+            model = [*model, packaged_model(WIRES)]
+            used = use_models(model, settings, scheme)
         _require_codes(used, settings, scheme)
-        towers, line = used[0].target.is_tower, finds_lines(used)
-    if voltage is not None and named and not line:
-        raise typer.BadParameter(
-            "needs a model of towers and one of target wire (--model, twice)",
-            param_hint="--voltage",
-        )
+        towers, lines = used[0].target.is_tower, finds_lines(used)
+    if named and not lines:
+        if line:
+            raise typer.BadParameter("needs a model of towers (--model)", param_hint="--line")
+        if voltage is not None:
+            raise typer.BadParameter(
+                "needs --line, or a model of towers and one of target wire (--model, twice)",
+                param_hint="--voltage",
+            )
     files = {
-        given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=line)
+        given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=lines)
         for given, survey in named.items()
     }
     outputs = [output for each in files.values() for output in each.outputs()]

@@ -1,22 +1,29 @@
-"""The model that comes with the package, with its card.
+"""The models that come with the package, one of towers and one of wires, each with its card.
 
-The workflow trains it on synthetic surveys (rule ``packaged_model``), and ``make model`` copies it
-here. It is never edited: a test compares it with the digest in its card.
+The workflow trains them on synthetic surveys (rules ``packaged_model`` and ``packaged_wires``), and
+``make model`` copies them here. They are never edited: a test compares each with the digest in its
+card.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-MODEL = "towers.json"
-CARD = "towers.md"
+TOWERS, WIRES = PACKAGED = "towers", "wires"
+"""Names of the models, which stand for their files on the command line."""
 
 
-def packaged_model() -> Path:
-    """The model file (``scenenet.models.model_file``) that commands use without ``--model``."""
-    return Path(__file__).with_name(MODEL)
+def packaged_model(name: str = TOWERS) -> Path:
+    """A model file (``scenenet.models.model_file``); that of towers is what commands use without
+    ``--model``."""
+    return Path(__file__).with_name(f"{name}.json")
 
 
-def packaged_card() -> Path:
-    """Its model card (Markdown): training data, use, limits and scores."""
-    return Path(__file__).with_name(CARD)
+def packaged_card(name: str = TOWERS) -> Path:
+    """The card of a model (Markdown): training data, use, limits and scores."""
+    return Path(__file__).with_name(f"{name}.md")
+
+
+def named_model(given: Path) -> Path:
+    """The model file that a user names: that of the package where there is no such file."""
+    return packaged_model(str(given)) if str(given) in PACKAGED and not given.exists() else given

@@ -88,6 +88,8 @@ def write_lists(
         clearances=None
         if clearances is None
         else SurveyClearances.from_json(read_json(clearances)),
+        # The work files keep the class codes for the clearances only.
+        scheme=None if clearances is None else scheme,
     )
     read = tuple(written.get(file.name, (file, ""))[0] for file in joined.files)
     prediction = replace(prediction, files=read)

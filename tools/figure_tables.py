@@ -26,6 +26,8 @@ MODELS = {"model": "model", "counted": "counted", "live_share": "live", "precisi
           "precision_std": "±", "recall": "recall", "recall_std": "±", "f05": "F0.5",
           "iou_tower": "IoU of towers", "truth_f05": "F0.5, truth",
           "thesis_precision": "thesis: precision", "thesis_recall": "recall"}  # fmt: skip
+POINTS = {"file": "recording", "points.precision": "precision of points",
+          "points.recall": "recall", "points.iou": "IoU"}  # fmt: skip
 VERDICTS = {"place": "thesis", "claim": "claim", "verdict": "verdict", "statistic": "statistic",
             "value": "value", "low": "95 % from", "high": "to"}  # fmt: skip
 PUBLISHED_RUNS = {"variant": "parameters", "seed": "seed", "precision": "precision",
@@ -179,6 +181,7 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
         "figures of synthetic lines": of_files("lines", "seed of the line", TRUTH),
         "figures of recordings": of_files("recordings", "recording", ""),
+        "figures of conductors of recordings": of_csv("wires", "wires", POINTS),
         "figures of observers of conductors": printed("observers", "observers.txt", 0),
         "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),

@@ -1,10 +1,10 @@
 """Lines that are found in synthetic surveys, against the truth.
 
-    python -m scenenet.experiments.line_truth --model WIRES [--towers 24] [--seed 5] [--kinds ...]
+    python -m scenenet.experiments.line_truth [--model WIRES] [--towers 24] [--seed 5] [--kinds ...]
 
-makes a survey for each kind of tower, finds its towers with the model of the package and its wires
-with WIRES, and compares the conductors, the clearances and the trees that could fall with those of
-the survey. Prints two Markdown tables.
+makes a survey for each kind of tower, finds its towers and wires with the models of the package, or
+its wires with WIRES, and compares the conductors, the clearances and the trees that could fall with
+those of the survey. Prints two Markdown tables.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from scenenet.core.errors import InputError
 from scenenet.core.scratch import scratch_folder
 from scenenet.detection.settings import DetectionSettings
 from scenenet.experiments.line_truth import clearances, conductors
-from scenenet.models.packaged import packaged_model
+from scenenet.models.packaged import WIRES, packaged_model
 from scenenet.pointcloud.reading import read
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
@@ -71,7 +71,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m scenenet.experiments.line_truth",
         description=__doc__.splitlines()[0] if __doc__ else None,
     )
-    parser.add_argument("--model", type=Path, required=True, help="model of wires")
+    parser.add_argument(
+        "--model",
+        type=Path,
+        default=packaged_model(WIRES),
+        help="model of wires (default: that of the package)",
+    )
     parser.add_argument("--towers", type=int, default=24, help="towers of a line (default 24)")
     parser.add_argument("--seed", type=int, default=5, help="of the surveys (default 5)")
     parser.add_argument("--voltage", type=float, default=66, help="kV, of the limits (default 66)")

@@ -30,6 +30,7 @@ from scenenet.models.code_records import CodeMissing, record_of, require, requir
 from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
+from scenenet.models.packaged import PACKAGED
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import LARGEST_KERNEL, KernelSize, MetricSettings, TargetText
 from scenenet.pointcloud.targets import TOWER, Target
@@ -146,7 +147,11 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError("there is no such model file", file=path)
+        raise InputError(
+            "there is no such model file",
+            file=path,
+            remedy=f"Name a file, or a model of the package: {' or '.join(PACKAGED)}",
+        )
     try:
         if path.suffix == ".safetensors":
             return _read_cnn(path)

@@ -302,7 +302,7 @@ def test_lengths_and_voxels_stay_within_what_a_tile_holds():
 
 
 def test_a_missing_model_file_is_refused(tmp_path):
-    with pytest.raises(InputError, match="no such model file"):
+    with pytest.raises(InputError, match=r"no such model file.*towers or wires"):
         read_model(tmp_path / "m.json")
 
 

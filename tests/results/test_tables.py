@@ -238,7 +238,8 @@ def test_each_verified_property_of_each_model_has_a_row(results: Results, thesis
 
 
 def test_every_table_is_written_and_reads_back(results: Results, thesis: Thesis, tmp_path: Path):
-    paths = tables.write_tables(with_a_timed_study(results), thesis, tmp_path / "tables")
+    made = with_a_timed_study(with_observer(results))
+    paths = tables.write_tables(made, thesis, tmp_path / "tables")
     assert {path.stem for path in paths} == set(tables.TABLES)
     for path in paths:
         assert len(pd.read_csv(path)) > 0, path.name

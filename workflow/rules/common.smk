@@ -172,11 +172,6 @@ def champion_file(model):
     return f"{R}/models/{model}{suffix_of(model)}"
 
 
-def observer_files():
-    """The models that predict together with that of towers."""
-    return [f"{R}/models/{name}.json" for name in settings.predict.observers]
-
-
 def scheme_of(survey):
     """What the class codes of a survey mean, which lines need; without lines, nothing."""
     return {"codes": SURVEYS[survey].codes} if settings.finds_lines() else {}

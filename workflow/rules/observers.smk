@@ -3,28 +3,6 @@
 They have the stages of the models of towers, on crops of their own, and are trained from one seed.
 """
 
-OBSERVED = {observer.name: observer for observer in settings.observers}
-SEED = settings.seeds[0]
-
-
-def finds(w):
-    return OBSERVED[w.observer].target
-
-
-def grid_of(w):
-    return OBSERVED[w.observer].grid().model_dump(mode="json")
-
-
-def squares_of(output):
-    """An output of the squares of an observer in each training survey."""
-    return lambda w: every("squares", output, observer=[w.observer])
-
-
-def square_voxels_of(output):
-    """An output of the voxels of these squares."""
-    return lambda w: every("square_voxels", output, observer=[w.observer])
-
-
 rule squares:
     input:
         survey=lambda w: source(w.survey),

@@ -2,22 +2,6 @@
 conductors and clearances of their lines if an observer of wires predicts as well."""
 
 
-def line_tables():
-    """The tables of the lines of a survey, by the names of the outputs."""
-    if not settings.finds_lines():
-        return {}
-    return {
-        name: in_report(
-            f"{R}/predict/{{survey}}/{{survey}}.{name}.csv",
-            f"prediction-{name}",
-            "predictions",
-            "Files",
-            {"survey": "{survey}", "file": name.capitalize()},
-        )
-        for name in ("spans", "conductors", "clearances")
-    }
-
-
 rule predict:
     input:
         survey=lambda w: source(w.survey),

@@ -3,6 +3,7 @@
 They have the stages of the models of towers, on crops of their own, and are trained from one seed.
 """
 
+
 rule squares:
     input:
         survey=lambda w: source(w.survey),

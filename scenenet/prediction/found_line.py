@@ -19,9 +19,10 @@ from scenenet.prediction.surroundings import occupied_voxels
 from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tiling import TileSpool, groups
 
-DOUBTFUL = 0.7
-"""Share of tau from which points count beside wires that are certain. The observer is less sure of
-a single thin wire, such as an earth wire, and of wires close to trees."""
+SURE, DOUBTFUL = 0.85, 0.7
+"""Shares of tau from which points may be those of a wire, and from which they count beside wires
+that are found. The tracing has tests of its own, and the observer is less sure of a wire with few
+points, such as an earth wire, and of wires close to trees."""
 
 
 AGAIN_M = REACH_M
@@ -122,7 +123,7 @@ def _wire_points(wires: WireSearch, spool: TileSpool) -> WirePoints:
         prediction = wires.predictions.read(code)
         near = prediction.probability >= DOUBTFUL * wires.tau
         if near.any():
-            found[code] = prediction.voxel[near], prediction.probability[near] >= wires.tau
+            found[code] = prediction.voxel[near], prediction.probability[near] >= SURE * wires.tau
     places, sure = [np.empty((0, 3))], [np.empty(0, bool)]
     for tile, _ in spool.places() if found else ():
         xyz = spool.points(tile)

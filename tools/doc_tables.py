@@ -8,72 +8,25 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
-def tower_list() -> str:
-    """Every property of a tower in the tower list."""
-    from scenenet.detection.survey_tower import TOWER_COLUMNS
+def columns_of(module: str, columns: str) -> Callable[[], str]:
+    """Makes the table of every column of a list.
 
-    return _table("column", ((c.name, c.unit, c.description) for c in TOWER_COLUMNS))
+    Args:
+        module: that declares them.
+        columns: their name in it.
+    """
 
+    def table() -> str:
+        declared = getattr(import_module(module), columns)
+        return _table("column", ((c.name, c.unit, c.description) for c in declared))
 
-def spans() -> str:
-    """Every column of the list of spans."""
-    from scenenet.line.records import SPAN_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in SPAN_COLUMNS))
-
-
-def conductors() -> str:
-    """Every column of the list of conductors."""
-    from scenenet.line.records import CONDUCTOR_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in CONDUCTOR_COLUMNS))
-
-
-def supports() -> str:
-    """Every column of the list of towers of lines."""
-    from scenenet.line.records import SUPPORT_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in SUPPORT_COLUMNS))
-
-
-def line_notes() -> str:
-    """Every column of the list of places to look at."""
-    from scenenet.line.records import NOTE_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in NOTE_COLUMNS))
-
-
-def clearances() -> str:
-    """Every column of the list of clearances."""
-    from scenenet.clearance.records import CLEARANCE_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in CLEARANCE_COLUMNS))
-
-
-def span_clearances() -> str:
-    """Every column of the table of clearances by span."""
-    from scenenet.clearance.records import SPAN_CLEARANCE_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in SPAN_CLEARANCE_COLUMNS))
-
-
-def clearance_profile() -> str:
-    """Every column of the steps along spans."""
-    from scenenet.clearance.records import PROFILE_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in PROFILE_COLUMNS))
-
-
-def fall_trees() -> str:
-    """Every column of the list of trees that could fall."""
-    from scenenet.clearance.records import TREE_COLUMNS
-
-    return _table("column", ((c.name, c.unit, c.description) for c in TREE_COLUMNS))
+    return table
 
 
 def class_schemes() -> str:
@@ -116,15 +69,15 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "targets": targets,
     "measurements": measurements,
     "scores": scores,
-    "tower list": tower_list,
-    "spans": spans,
-    "conductors": conductors,
-    "supports": supports,
-    "line notes": line_notes,
-    "clearances by span": span_clearances,
-    "clearances": clearances,
-    "fall trees": fall_trees,
-    "clearance profile": clearance_profile,
+    "tower list": columns_of("scenenet.detection.survey_tower", "TOWER_COLUMNS"),
+    "spans": columns_of("scenenet.line.records", "SPAN_COLUMNS"),
+    "conductors": columns_of("scenenet.line.records", "CONDUCTOR_COLUMNS"),
+    "supports": columns_of("scenenet.line.records", "SUPPORT_COLUMNS"),
+    "line notes": columns_of("scenenet.line.records", "NOTE_COLUMNS"),
+    "clearances by span": columns_of("scenenet.clearance.records", "SPAN_CLEARANCE_COLUMNS"),
+    "clearances": columns_of("scenenet.clearance.records", "CLEARANCE_COLUMNS"),
+    "fall trees": columns_of("scenenet.clearance.records", "TREE_COLUMNS"),
+    "clearance profile": columns_of("scenenet.clearance.records", "PROFILE_COLUMNS"),
 }
 """What stands in the first comment -> the table."""
 

@@ -26,8 +26,6 @@ MODELS = {"model": "model", "counted": "counted", "live_share": "live", "precisi
           "precision_std": "±", "recall": "recall", "recall_std": "±", "f05": "F0.5",
           "iou_tower": "IoU of towers", "truth_f05": "F0.5, truth",
           "thesis_precision": "thesis: precision", "thesis_recall": "recall"}  # fmt: skip
-POINTS = {"file": "recording", "points.precision": "precision of points",
-          "points.recall": "recall", "points.iou": "IoU"}  # fmt: skip
 VERDICTS = {"place": "thesis", "claim": "claim", "verdict": "verdict", "statistic": "statistic",
             "value": "value", "low": "95 % from", "high": "to"}  # fmt: skip
 PUBLISHED_RUNS = {"variant": "parameters", "seed": "seed", "precision": "precision",
@@ -110,10 +108,24 @@ def towers_table(values: Values, run: str, first: str, against: str) -> str:
         there = row[f"{towers}n_true"]
         found = round((_or_zero(row[f"{towers}recall"])) * there)
         cells = [str(row["file"]), f"{found} / {there}", str(row[f"{towers}n_predicted"] - found)]
-        cells += [_two(row[points + name]) for name in ("precision", "recall", "iou")]
+        cells += _points(row, points)
         cells += [_two(row[f"{towers}median_{name}_m"]) for name in LINE_ERRORS]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def points_table(values: Values, run: str, first: str) -> str:
+    """Points against the labels, a row for each file that was evaluated; arguments as
+    ``towers_table``."""
+    lines = [f"| {first} | precision of points | recall | IoU |", "|---" * 4 + "|"]
+    for row in sorted(values.rows(run, run), key=_number_or_name):
+        lines.append(f"| {' | '.join([str(row['file']), *_points(row, 'points.')])} |")
+    return "\n".join(lines)
+
+
+def _points(row: Row, points: str) -> list[str]:
+    """Precision, recall and IoU of points, whose columns begin with ``points``."""
+    return [_two(row[points + name]) for name in ("precision", "recall", "iou")]
 
 
 def _number_or_name(row: Row) -> tuple[bool, int, str]:
@@ -181,7 +193,9 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
         "figures of synthetic lines": of_files("lines", "seed of the line", TRUTH),
         "figures of recordings": of_files("recordings", "recording", ""),
-        "figures of conductors of recordings": of_csv("wires", "wires", POINTS),
+        "figures of conductors of recordings": Table(
+            ("wires",), partial(points_table, values, "wires", "recording")
+        ),
         "figures of observers of conductors": printed("observers", "observers.txt", 0),
         "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),

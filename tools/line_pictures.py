@@ -1,11 +1,10 @@
-"""The pictures of conductors in the documentation: ``python tools/line_pictures.py --wire W.json``.
+"""The pictures of conductors in the documentation: ``python tools/line_pictures.py``.
 
-Makes a synthetic line of pylons, finds its line with the model of the package and a model of wires,
-draws the conductors over the points, and opens the page of the survey in Chromium:
-``docs/images/line.png`` and ``spans.png``. With real recordings
-(``SCENENET_REAL_DATA``, or ``shared/data`` beside the project) it draws the Dutch corridor as well,
-into ``results/line``: nothing that comes from a recording is part of the project. A model of wires:
-``scenenet train --target wire`` (docs/guides/targets.md).
+Makes a synthetic line of pylons, finds its line with the models of the package, draws the
+conductors over the points, and opens the page of the survey in Chromium: ``docs/images/line.png``
+and ``spans.png``. With real recordings (``SCENENET_REAL_DATA``, or ``shared/data`` beside the
+project) it draws the Dutch corridor as well, into ``results/line``: nothing that comes from a
+recording is part of the project.
 """
 
 from __future__ import annotations
@@ -26,6 +25,7 @@ from doc_pictures import IMAGES, chromium, save, take_spans
 from scenenet.core.errors import InputError
 from scenenet.figures.plots.style import COLOURS, DPI, TOWER_COLOUR, new_figure
 from scenenet.line.frame import SpanFrame
+from scenenet.models.packaged import WIRES, packaged_model
 from scenenet.prediction.result_files import PredictionFiles
 
 if TYPE_CHECKING:
@@ -193,7 +193,6 @@ def predict(
     """Predict a survey with the model of the package and a model of wires."""
     from scenenet.clearance.settings import ClearanceSettings
     from scenenet.detection.settings import DetectionSettings
-    from scenenet.models.packaged import packaged_model
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles
     from scenenet.prediction.writers import predict_to_files
@@ -233,7 +232,8 @@ def take_real(wire: Path, out: Path) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--wire", type=Path, required=True, help="model of wires")
+    wires = packaged_model(WIRES)
+    parser.add_argument("--wire", type=Path, default=wires, help="another model of wires")
     parser.add_argument("--out", type=Path, default=IMAGES, help="where the synthetic one goes")
     parser.add_argument(
         "--real", type=Path, default=ROOT / "results" / "line", help="where the real one goes"

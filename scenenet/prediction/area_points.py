@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenenet.clearance.section import Area
+from scenenet.prediction.found_line import WireSearch
 from scenenet.prediction.work.structures import Owners, Structures
-from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tiling import TileSpool, groups
 
 KEPT_POINTS = 4_000_000
@@ -22,19 +22,13 @@ FREE, TOWER, WIRE = 0, 1, 2
 class WireVoxels:
     """The voxels that a model of wires is certain of."""
 
-    def __init__(self, spool: TileSpool, predictions: TilePredictions, tau: float) -> None:
-        """Read the predictions.
-
-        Args:
-            spool: the voxels that the model observes.
-            predictions: of the model, for all its tiles.
-            tau: of the model.
-        """
-        self._lattice = spool.lattice
+    def __init__(self, wires: WireSearch) -> None:
+        """Read the predictions."""
+        self._lattice = wires.spool.lattice
         self._sure: dict[int, np.ndarray] = {}
-        for code, _ in spool.places():
-            prediction = predictions.read(code)
-            sure = prediction.probability >= tau
+        for code, _ in wires.spool.places():
+            prediction = wires.predictions.read(code)
+            sure = prediction.probability >= wires.tau
             if sure.any():
                 self._sure[code] = prediction.voxel[sure]
 

@@ -24,7 +24,6 @@ SURE, DOUBTFUL = 0.85, 0.7
 that are found. The tracing has tests of its own, and the observer is less sure of a wire with few
 points, such as an earth wire, and of wires close to trees."""
 
-
 AGAIN_M = REACH_M
 """m around a place at which the line expects a tower, in which it is looked for again: its wires
 end at its crossarms."""
@@ -75,6 +74,7 @@ def find_line_in_survey(
     kept if the line then leads to it.
 
     Args:
+        wires, towers: what conductors and towers are looked for in.
         found: the towers of the survey.
         progress: label of the progress on stderr; None shows no progress.
     """

@@ -19,7 +19,6 @@ from scenenet.core.outputs import check_space
 from scenenet.core.progress import quiet, track
 from scenenet.core.scratch import scratch_folder, temporary_directory
 from scenenet.detection.settings import DetectionSettings
-from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.targets import WIRE
 from scenenet.prediction.area_points import WireVoxels
@@ -115,11 +114,11 @@ def predict_survey(
         line, clearances = None, None
         wires = next((each for each in further if each.used.target.name == WIRE), None)
         if first.target.is_tower and wires is not None:
-            conductors = WireSearch(wires.spool, wires.tiles, wires.used.card.threshold())
-            lines = _line(folder, conductors, search, found, f"{survey.given.name}: spans traced")
+            label = f"{survey.given.name}: spans traced"
+            lines = _line(folder, wires.search, search, found, label)
             line, found = lines.line, lines.towers
             own = clearance or ClearanceSettings()
-            clearances = _clearances(joined, folder, found, wires, line, own, scheme)
+            clearances = _clearances(joined, folder, lines, wires.search, own, scheme)
         yield SurveyPrediction.of(
             joined,
             tiles[0],
@@ -201,18 +200,17 @@ def _line(
 def _clearances(
     joined: SurveyWork,
     folder: WorkFolder,
-    found: FoundTowers,
-    wires: FurtherModel,
-    line: SurveyLine,
+    found: FoundLine,
+    wires: WireSearch,
     settings: ClearanceSettings,
     scheme: ClassScheme | None,
 ) -> SurveyClearances:
     """What is near the lines of a survey."""
     if not folder.clearances.exists():
-        voxels = WireVoxels(wires.spool, wires.tiles, wires.used.card.threshold())
+        voxels = WireVoxels(wires)
         label = f"{joined.survey.given.name}: clearances measured"
         measured = find_clearances_in_survey(
-            joined.spool, line, found.structures, voxels, settings, scheme, label
+            joined.spool, found.line, found.towers.structures, voxels, settings, scheme, label
         )
         write_json(folder.clearances, measured.to_json())
     return SurveyClearances.from_json(read_json(folder.clearances))

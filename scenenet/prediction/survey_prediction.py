@@ -19,6 +19,7 @@ from scenenet.detection.survey_tower import SurveyTower
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.prediction.file_status import SurveyFile, readable
+from scenenet.prediction.found_line import WireSearch
 from scenenet.prediction.found_towers import FoundTowers
 from scenenet.prediction.point_dimensions import TOWER_CODE
 from scenenet.prediction.settings import PredictSettings
@@ -55,6 +56,11 @@ class FurtherModel:
     used: UsedModel
     spool: TileSpool
     tiles: TilePredictions
+
+    @property
+    def search(self) -> WireSearch:
+        """What conductors are looked for in, where it is a model of wires."""
+        return WireSearch(self.spool, self.tiles, self.used.card.threshold())
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from scenenet.pointcloud.class_schemes import EDP
 from scenenet.prediction.area_points import WireVoxels
 from scenenet.prediction.clearance_lists import write_clearance_layers, write_clearances_csv
 from scenenet.prediction.found_clearances import find_clearances_in_survey
+from scenenet.prediction.found_line import WireSearch
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
 from scenenet.prediction.work.structures import Structures
 from scenenet.prediction.work.tile_predictions import (
@@ -74,7 +75,7 @@ def wires(survey, tmp_path_factory) -> WireVoxels:
                 "predictions", code, TilePrediction(tile.voxel, probability, shares).records()
             )
         blocks.end({"geneos": []})
-    return WireVoxels(spool, TilePredictions([BlockFile(path)]), 0.5)
+    return WireVoxels(WireSearch(spool, TilePredictions([BlockFile(path)]), 0.5))
 
 
 @pytest.fixture(scope="module")

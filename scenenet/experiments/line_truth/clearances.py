@@ -13,7 +13,7 @@ from scenenet.clearance.danger import places
 from scenenet.clearance.distance import nearest_on
 from scenenet.clearance.records import SurveyClearances
 from scenenet.clearance.settings import VEGETATION, ClearanceSettings
-from scenenet.experiments.line_truth.conductors import true_one
+from scenenet.experiments.line_truth.conductors import percentiles, true_one
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.cloud import PointCloud
 from scenenet.synthetic.codes import LOW, SCRUB, TALL, TREE
@@ -178,9 +178,7 @@ def table(comparisons: Sequence[Comparison]) -> list[str]:
         "|---" * 8 + "|",
     ]
     for one in comparisons:
-        error = (
-            np.percentile(one.vegetation, [50, 95, 100]) if len(one.vegetation) else [np.nan] * 3
-        )
+        error = percentiles(one.vegetation, 50, 95, 100)
         lines.append(
             f"| {one.kind} | {error[0]:.3f}, {error[1]:.2f}, {error[2]:.2f} | "
             f"{len(one.vegetation)}, {one.unseen} | {one.danger_points} | "

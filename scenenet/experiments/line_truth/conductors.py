@@ -124,6 +124,15 @@ def _true_towers(corridor: Corridor, towers: Sequence[SurveyTower]) -> dict[int,
     return names
 
 
+def percentiles(values: np.ndarray, *shares: float) -> np.ndarray:
+    """Percentiles of values (n,), nan without any.
+
+    Args:
+        shares: %.
+    """
+    return np.percentile(values if len(values) else [np.nan], shares)
+
+
 def table(comparisons: Sequence[Comparison]) -> list[str]:
     """Lines of a Markdown table."""
     lines = [
@@ -134,9 +143,8 @@ def table(comparisons: Sequence[Comparison]) -> list[str]:
     ]
     for one in comparisons:
         found, listed, true = one.towers
-        sag = np.percentile(one.sag, [50, 95, 100]) if len(one.sag) else [np.nan] * 3
-        ends = np.percentile(one.attachment, [50, 95]) if len(one.sag) else [np.nan] * 2
-        error, rmse = (np.median(each) if len(each) else np.nan for each in (100 * one.c, one.rmse))
+        sag, ends = percentiles(one.sag, 50, 95, 100), percentiles(one.attachment, 50, 95)
+        (error,), (rmse,) = percentiles(100 * one.c, 50), percentiles(one.rmse, 50)
         lines.append(
             f"| {one.kind} | {found} of {true}, {listed - found} | {one.found} of {one.true} | "
             f"{one.false} | {sag[0]:.3f}, {sag[1]:.3f}, {sag[2]:.3f} | {error:.1f} "

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from scenenet.clearance.settings import ClearanceSettings
-from scenenet.core.files import atomic, read_json, write_json
+from scenenet.core.files import read_json, write_json
 from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.prediction.found_clearances import WireVoxels, find_clearances_in_survey
 from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch
-from scenenet.prediction.jobs.joined import joined_predictions, joined_work, usable
-from scenenet.prediction.survey_files import SurveyFiles, result_name
+from scenenet.prediction.jobs.joined import joined_predictions, joined_work, write_near
+from scenenet.prediction.survey_files import SurveyFiles
 from scenenet.prediction.work.conductor_points import columns_reached
 from scenenet.prediction.work.survey_work import SurveyWork
 from scenenet.prediction.work.tiling import Layer, column_of
+from scenenet.prediction.work.work_file import WorkFile
 
 
 def find_line_of(
@@ -53,17 +55,16 @@ def find_line_of(
     write_json(line, found.to_json())
     lattice = joined.spool.lattice
     reached = [(each, columns_reached(each, lattice)) for each in found.line.conductors]
-    with atomic(near) as folder:
-        folder.mkdir()
-        for work in usable(joined):
-            codes = list(work.blocks.codes("voxels"))
-            columns = set(map(column_of, codes))
-            facts = {
-                "system": joined.system.to_json(),
-                "structures": found.towers.structures.reaching(lattice, codes).to_json(),
-                "conductors": [each.to_json() for each, there in reached if columns & there],
-            }
-            write_json(folder / f"{result_name(work.file.name)}.json", facts)
+
+    def reaching(work: WorkFile) -> Mapping[str, Any]:
+        codes = list(work.blocks.codes("voxels"))
+        columns = set(map(column_of, codes))
+        return {
+            "structures": found.towers.structures.reaching(lattice, codes).to_json(),
+            "conductors": [each.to_json() for each, there in reached if columns & there],
+        }
+
+    write_near(joined, near, reaching)
 
 
 def find_clearances_of(
@@ -88,12 +89,11 @@ def find_clearances_of(
         InputError: no file can be used, or the limits have none for the voltage.
     """
     joined, found = joined_work(survey, works), FoundLine.from_json(read_json(line))
-    search = _wires(joined, wires)
     measured = find_clearances_in_survey(
         joined.spool,
         found.line,
         found.towers.structures,
-        WireVoxels(search.spool, search.predictions, search.tau),
+        WireVoxels(_wires(joined, wires)),
         settings,
         scheme,
         f"{survey.name}: clearances measured",

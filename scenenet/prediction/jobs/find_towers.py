@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from scenenet.core.files import atomic, write_json
+from scenenet.core.files import write_json
 from scenenet.detection.settings import DetectionSettings
 from scenenet.prediction.found_towers import TowerSearch, find_in_survey
-from scenenet.prediction.jobs.joined import joined_predictions, joined_work, usable
-from scenenet.prediction.survey_files import SurveyFiles, result_name
+from scenenet.prediction.jobs.joined import joined_predictions, joined_work, write_near
+from scenenet.prediction.survey_files import SurveyFiles
+from scenenet.prediction.work.work_file import WorkFile
 
 
 def find_towers_of(
@@ -42,10 +44,9 @@ def find_towers_of(
     search = TowerSearch(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
     found = find_in_survey(search, f"{survey.name}: candidates measured")
     write_json(towers, found.to_json())
-    with atomic(near) as folder:
-        folder.mkdir()
-        for work in usable(joined):
-            codes = work.blocks.codes("voxels")
-            own = found.structures.reaching(work.lattice, codes)
-            facts = {"system": joined.system.to_json(), "structures": own.to_json()}
-            write_json(folder / f"{result_name(work.file.name)}.json", facts)
+
+    def reaching(work: WorkFile) -> Mapping[str, Any]:
+        own = found.structures.reaching(work.lattice, work.blocks.codes("voxels"))
+        return {"structures": own.to_json()}
+
+    write_near(joined, near, reaching)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from scenenet.prediction.survey_files import SurveyFiles
+from scenenet.core.files import atomic, write_json
+from scenenet.prediction.survey_files import SurveyFiles, result_name
 from scenenet.prediction.work.block_file import BlockFile
 from scenenet.prediction.work.survey_work import SurveyWork
 from scenenet.prediction.work.tile_predictions import TilePredictions
@@ -36,7 +38,27 @@ def joined_predictions(joined: SurveyWork, predictions: Sequence[str | Path]) ->
     return TilePredictions([BlockFile(file) for path, file in each if path in used])
 
 
-def usable(joined: SurveyWork) -> Iterator[WorkFile]:
+def write_near(
+    joined: SurveyWork, near: str | Path, reaching: Callable[[WorkFile], Mapping[str, Any]]
+) -> None:
+    """Write what of a survey reaches into each of its files: a JSON file for each that can be used,
+    with the system of the survey.
+
+    Args:
+        near: folder to write. A file in it stays the same to the byte while its content does.
+        reaching: gives what reaches into a file, as JSON.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    with atomic(near) as folder:
+        folder.mkdir()
+        for work in _usable(joined):
+            facts = {"system": joined.system.to_json(), **reaching(work)}
+            write_json(folder / f"{result_name(work.file.name)}.json", facts)
+
+
+def _usable(joined: SurveyWork) -> Iterator[WorkFile]:
     """The work files of the files of a survey that can be used."""
     names = {file.name for file in joined.files if file.error is None}
     return (work for work in joined.used if work.file.name in names)

@@ -99,9 +99,11 @@ def span_pictures(
     if line is None:
         return
     wires = next(each for each in prediction.further if each.used.target.name == WIRES)
-    voxels = WireVoxels(wires.spool, wires.tiles, wires.used.card.threshold())
     points = AreaLookUp(
-        prediction.spool, prediction.structures, voxels, classes=prediction.scheme is not None
+        prediction.spool,
+        prediction.structures,
+        WireVoxels(wires.search),
+        classes=prediction.scheme is not None,
     )
     settings = prediction.clearance or ClearanceSettings()
     of_span: dict[int, list[Conductor]] = defaultdict(list)

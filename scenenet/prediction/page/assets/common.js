@@ -92,3 +92,19 @@ function numbersOf(script) {
   for (let i = 0; i < numbers.length; i++) numbers[i] = view.getInt16(2 * i, true);
   return numbers;
 }
+
+// A bar of a round length at the lower left.
+function scaleBar(context, width, height, scale, named) {
+  const length = round(width / 3 / scale / data.planar_m), long = length * data.planar_m * scale;
+  context.strokeStyle = context.fillStyle = named("ink");
+  context.lineWidth = 1.5;
+  context.beginPath();
+  context.moveTo(8, height - 14);
+  context.lineTo(8, height - 8);
+  context.lineTo(8 + long, height - 8);
+  context.lineTo(8 + long, height - 14);
+  context.stroke();
+  context.font = "12px system-ui, sans-serif";
+  context.textAlign = "left";
+  context.fillText(`${plain(length)} ${data.planar}`, 14 + long, height - 8);
+}

@@ -54,17 +54,7 @@ function drawView(canvas, tower, view) {
   dots(own, n, 1.5);
   context.fillStyle = named("tower");
   dots(0, own, 2);
-  const length = round(width / 3 / scale / data.planar_m), long = length * data.planar_m * scale;
-  context.strokeStyle = context.fillStyle = named("ink");
-  context.lineWidth = 1.5;
-  context.beginPath();
-  context.moveTo(8, height - 14);
-  context.lineTo(8, height - 8);
-  context.lineTo(8 + long, height - 8);
-  context.lineTo(8 + long, height - 14);
-  context.stroke();
-  context.font = "12px system-ui, sans-serif";
-  context.fillText(`${plain(length)} ${data.planar}`, 14 + long, height - 8);
+  scaleBar(context, width, height, scale, named);
   if (view.level) {
     context.beginPath();
     context.moveTo(width - 16, 6);

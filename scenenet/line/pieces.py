@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
+
+from scenenet.core.compilation import COMPILED
+
+EXACT = COMPILED | {"fastmath": False}
+"""A product and a sum stay two instructions: cells are the same on every machine."""
 
 WINDOW_M, SHORTEST_WINDOW_M, WINDOWS = 12.0, 4.0, 4
 """m, length of a piece: a wire of a parameter of 300 m bends by 6 cm over it. In a short stretch of
@@ -64,77 +70,150 @@ def window_of(length: float) -> float:
 def find_pieces(stz: np.ndarray, length: float = WINDOW_M) -> Pieces:
     """The pieces of ``length`` m among points (n, 3) m in the frame of a span. Windows overlap by
     half."""
-    middles, slopes, weights, windows, members = [], [], [], [], []
     order = np.argsort(stz[:, 0], kind="stable")
-    s = stz[order, 0]
-    if len(s) == 0:
+    if len(order) == 0:
         return Pieces(np.empty((0, 3)), np.empty((0, 2)), np.empty(0), np.empty(0, int), [])
+    ordered = stz[order]
     step = length / 2
-    first, last = int(np.floor(s[0] / step)) - 1, int(np.floor(s[-1] / step))
-    for window in range(first, last + 1):
-        low, high = np.searchsorted(s, [window * step, window * step + length])
-        rows = order[low:high]
-        if len(rows) < MIN_POINTS:
+    first, last = (int(np.floor(ordered[end, 0] / step)) for end in (0, -1))
+    windows = np.arange(first - 1, last + 1)
+    lows = np.searchsorted(ordered[:, 0], windows * step)
+    highs = np.searchsorted(ordered[:, 0], windows * step + length)
+    middles, slopes, weights, numbers, members = [], [], [], [], []
+    for window, low, high in zip(windows.tolist(), lows.tolist(), highs.tolist(), strict=True):
+        if high - low < MIN_POINTS:
             continue
-        for group in _groups(stz[rows], (window + 1) * step):
-            own = rows[group]
-            reach = np.ptp(stz[own, 0])
+        points = ordered[low:high]
+        gradient = GRADIENTS[_gradient((window + 1) * step, points, GRADIENTS)]
+        rows, ends = _groups((window + 1) * step, points, gradient)
+        lines = _straight(points, rows, ends)
+        for number, (*middle, by_t, by_z, reach, spread) in enumerate(lines.tolist()):
+            own = order[low + rows[ends[number] : ends[number + 1]]]
             if len(own) < MIN_POINTS or reach < MIN_SHARE * length:
                 continue
-            middle, slope, spread = _straight(stz[own])
-            if abs(slope[1]) > STEEPEST or spread > THICKEST_M:
+            if abs(by_z) > STEEPEST or spread > THICKEST_M:
                 continue
             middles.append(middle)
-            slopes.append(slope)
+            slopes.append((by_t, by_z))
             weights.append(reach)
-            windows.append(window)
+            numbers.append(window)
             members.append(own)
     return Pieces(
         np.array(middles).reshape(-1, 3),
         np.array(slopes).reshape(-1, 2),
         np.array(weights),
-        np.array(windows, int),
+        np.array(numbers, int),
         members,
     )
 
 
-def _groups(stz: np.ndarray, middle: float) -> list[np.ndarray]:
-    """Rows of the points of each wire in a window: they are close together when seen along their
-    common slope."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
+@numba.njit(**EXACT)
+def _groups(middle, points, gradient):  # pragma: no cover - compiled
+    """Rows (n,) of the points (n, 3) of each wire in a window, and where those of each begin and
+    end: they are close together when seen along their common slope.
 
-    s, t, z = stz[:, 0] - middle, stz[:, 1], stz[:, 2]
-    gradient = _gradient(s, t, z)
-    seen = np.rint(np.column_stack((t, z - gradient * s)) / SEEN_M).astype(np.int64)
-    cells, of = np.unique(seen, axis=0, return_inverse=True)
-    pairs = cKDTree(cells).query_pairs(APART_M / SEEN_M, output_type="ndarray")
-    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(cells),) * 2)
-    label = connected_components(links, directed=False)[1][of.ravel()]
-    order = np.argsort(label, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    Args:
+        middle: m, s of the middle of the window.
+        gradient: of ``_gradient``.
+    """
+    n = len(points)
+    across, up = np.empty(n, np.int64), np.empty(n, np.int64)
+    for i in range(n):
+        s, t, z = points[i, 0] - middle, points[i, 1], points[i, 2]
+        across[i], up[i] = np.rint(t / SEEN_M), np.rint((z - gradient * s) / SEEN_M)
+    key = (across - across.min()) * (up.max() - up.min() + 1) + (up - up.min())
+    order = np.argsort(key, kind="mergesort")
+    cell_of = np.empty(n, np.int64)
+    first = np.empty(n, np.int64)
+    cells = 0
+    for i in range(n):
+        if i == 0 or key[order[i]] != key[order[i - 1]]:
+            first[cells] = order[i]
+            cells += 1
+        cell_of[order[i]] = cells - 1
+    near = APART_M / SEEN_M
+    root = np.arange(cells)
+    for i in range(cells):
+        a, b = across[first[i]], up[first[i]]
+        for j in range(i + 1, cells):
+            da, db = across[first[j]] - a, up[first[j]] - b
+            if da > near:
+                break
+            if da * da + db * db <= near * near:
+                one, other = _root(root, i), _root(root, j)
+                root[max(one, other)] = min(one, other)
+    label = np.empty(cells, np.int64)
+    count = 0
+    for i in range(cells):
+        if root[i] == i:
+            label[i] = count
+            count += 1
+        else:
+            label[i] = label[_root(root, i)]
+    ends = np.zeros(count + 1, np.int64)
+    for i in range(n):
+        ends[label[cell_of[i]] + 1] += 1
+    ends = np.cumsum(ends)
+    at, rows = ends[:-1].copy(), np.empty(n, np.int64)
+    for i in range(n):
+        group = label[cell_of[i]]
+        rows[at[group]] = i
+        at[group] += 1
+    return rows, ends
 
 
-def _gradient(s: np.ndarray, t: np.ndarray, z: np.ndarray) -> float:
-    """Common rise of the wires in a window per metre: points of one wire fall into one cell only
-    where they are seen along it."""
-    few = slice(None, None, -(-len(s) // SAMPLE))
-    level = z[few, None] - s[few, None] * GRADIENTS
+@numba.njit(**EXACT)
+def _root(root, i):  # pragma: no cover - compiled
+    """The first cell of the group of a cell; the way there becomes shorter."""
+    while root[i] != i:
+        root[i] = root[root[i]]
+        i = root[i]
+    return i
+
+
+@numba.njit(**EXACT)
+def _gradient(middle, points, gradients):  # pragma: no cover - compiled
+    """Row in ``gradients`` of the common rise of the wires in a window per metre: points of one
+    wire fall into one cell only where they are seen along it."""
     cell = APART_M / 2
-    keys = np.floor(t[few, None] / cell).astype(np.int64) * 613
-    keys = (keys + np.floor(level / cell).astype(np.int64)) % HASHED
-    keys += np.arange(len(GRADIENTS)) * HASHED
-    counts = np.bincount(keys.ravel(), minlength=HASHED * len(GRADIENTS))
-    return float(GRADIENTS[np.argmax((counts.reshape(-1, HASHED) ** 2).sum(axis=1))])
+    step = -(-len(points) // SAMPLE)
+    best, most = 0, -1
+    for k in range(len(gradients)):
+        counts, squares = np.zeros(HASHED, np.int64), 0
+        for i in range(0, len(points), step):
+            s, t, z = points[i, 0] - middle, points[i, 1], points[i, 2]
+            key = np.int64(np.floor(t / cell)) * 613
+            key = (key + np.int64(np.floor((z - s * gradients[k]) / cell))) % HASHED
+            squares += 2 * counts[key] + 1
+            counts[key] += 1
+        if squares > most:
+            best, most = k, squares
+    return best
 
 
-def _straight(stz: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Middle (3,) m and slopes (2,) of the straight line through points (n, 3) m, and their root
-    mean square distance from it, m."""
-    middle = stz.mean(axis=0)
-    offset = stz - middle
-    ds = offset[:, 0]
-    slopes = ds @ offset[:, 1:] / (ds @ ds)
-    beside = offset[:, 1:] - ds[:, None] * slopes
-    return middle, slopes, float(np.sqrt((beside**2).sum(axis=1).mean()))
+@numba.njit(**EXACT)
+def _straight(points, rows, ends):  # pragma: no cover - compiled
+    """The straight line through each group of points, (G, 7): its middle, s, t and z in m, its
+    slopes of t and z, how far the points reach along s, and their root mean square distance from
+    it, m."""
+    lines = np.zeros((len(ends) - 1, 7))
+    for group in range(len(lines)):
+        own = rows[ends[group] : ends[group + 1]]
+        middle, slopes = lines[group, :3], lines[group, 3:5]
+        low, high = np.inf, -np.inf
+        for i in own:
+            middle += points[i]
+            low, high = min(low, points[i, 0]), max(high, points[i, 0])
+        middle /= len(own)
+        squared = 0.0
+        for i in own:
+            ds = points[i, 0] - middle[0]
+            slopes += ds * (points[i, 1:] - middle[1:])
+            squared += ds * ds
+        slopes /= squared
+        beside = 0.0
+        for i in own:
+            away = points[i, 1:] - middle[1:] - (points[i, 0] - middle[0]) * slopes
+            beside += away[0] * away[0] + away[1] * away[1]
+        lines[group, 5], lines[group, 6] = high - low, np.sqrt(beside / len(own))
+    return lines

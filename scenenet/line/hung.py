@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -98,14 +99,25 @@ class TracedSpan:
     wires: tuple[HungWire, ...]
 
 
-def traced(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> Iterator[HungWire]:
+def traced(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> tuple[HungWire, ...]:
     """The wires among some points, each between its first and its last point. Points that are not
     certain count where other wires of the span show that wires hang there.
+
+    The answer is kept: a line is searched once more with the towers that it asked for, and most of
+    its spans stay the same.
 
     Args:
         rows: (n,) of the points.
         frame: of the span.
     """
+    question = frame.x, frame.y, *frame.direction.tolist(), frame.length
+    key = hashlib.sha256(repr(question).encode() + rows.tobytes()).digest()
+    if key not in points.answers:
+        points.answers[key] = tuple(_traced(points, rows, frame))
+    return points.answers[key]
+
+
+def _traced(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> Iterator[HungWire]:
     certain = points.certain[rows]
     stz = frame.to_frame(points.xyz[rows])
     wires = trace_wires(stz[certain])

@@ -92,7 +92,7 @@ def _pairs(
 
 
 def _between(
-    wires: Iterator[HungWire], frame: SpanFrame, first: LineTower, last: LineTower
+    wires: Sequence[HungWire], frame: SpanFrame, first: LineTower, last: LineTower
 ) -> Iterator[HungWire]:
     """The wires that two towers hold, from the one to the other."""
     hidden = max(UNSEEN_M, UNSEEN_SHARE * frame.length)

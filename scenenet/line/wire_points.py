@@ -31,6 +31,11 @@ class WirePoints:
         return len(self.xyz)
 
     @cached_property
+    def answers(self) -> dict[bytes, Any]:
+        """What was found among some of these points, by a digest of the question."""
+        return {}
+
+    @cached_property
     def _cells(self) -> tuple[np.ndarray, list[np.ndarray], Any]:
         """Centres (C, 2) of the occupied cells, the rows of the points in each, and their tree."""
         from scipy.spatial import cKDTree

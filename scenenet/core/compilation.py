@@ -14,3 +14,7 @@ COMPILED: dict[str, Any] = {
     # gives the same result.
     "fastmath": {"contract"},
 }
+
+EXACT: dict[str, Any] = COMPILED | {"fastmath": False}
+"""For what is decided by a comparison: a product and a sum stay two instructions, so that a number
+is the one that numpy gives, on every machine."""

@@ -7,7 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
+
+from scenenet.core.compilation import EXACT
 
 SLIM = 1 / 8
 """Largest half width of a body as a share of its height; legs may be twice as wide."""
@@ -21,6 +24,9 @@ TOP_GAP = 3.0
 STRAY_GAP = 10.0
 """m, a gap between detected voxels that ends it too, because a stray return high above can look
 like a pole."""
+
+LOWEST = 5
+"""Percentile of the elevations at the foot that counts as its ground."""
 
 MIDDLE = 0.3, 0.9
 """Shares of the height between which the body is measured: below are shrubs and its legs."""
@@ -60,32 +66,7 @@ def measure_body(
         foot_radius: m, radius in which the ground is measured.
         voxel_size: m.
     """
-    distance = np.hypot(around[:, 0] - axis[0], around[:, 1] - axis[1])
-    lowest_seen = elevations.min()
-    near_foot = np.append(around[distance <= foot_radius, 2], lowest_seen)
-    # A percentile, because a single return below the ground would make a bush as tall as a tower.
-    lowest = float(np.percentile(near_foot, 5))
-    detected = np.unique(np.rint((elevations - lowest_seen) / voxel_size).astype(int))
-    middle = int((np.median(elevations) - lowest_seen) / voxel_size)
-    head = _unbroken(detected, middle, STRAY_GAP / voxel_size)
-    height = lowest_seen + head * voxel_size - lowest
-    slim = max(SLIM_M, SLIM * height)
-    legs = around[:, 2] - lowest < MIDDLE[0] * height
-    near = distance <= np.where(legs, 2 * slim, slim)
-    # Levels count from the lowest detected voxel, which is on the lattice.
-    levels = np.unique(np.rint((around[near, 2] - lowest_seen) / voxel_size).astype(int))
-    foot = round((lowest - lowest_seen) / voxel_size)
-    top = _unbroken(np.union1d(levels, detected[detected <= head]), middle, TOP_GAP / voxel_size)
-    upright = ((levels >= foot) & (levels <= top)).sum() / (top - foot + 1)
-    base = lowest - voxel_size / 2
-    return Body(base, float(lowest_seen + (top + 0.5) * voxel_size - base), float(upright))
-
-
-def _unbroken(levels: np.ndarray, start: int, gap: float) -> int:
-    """The highest of ascending levels (N,) above ``start`` before a gap wider than ``gap``."""
-    above = np.append(start, levels[levels > start])
-    breaks = np.flatnonzero(np.diff(above) > gap)
-    return int(above[breaks[0]] if len(breaks) else above[-1])
+    return Body(*_measured(*_columns(around), *axis.tolist(), elevations, foot_radius, voxel_size))
 
 
 def centre_body(
@@ -97,37 +78,143 @@ def centre_body(
     they are slim; otherwise a conductor, a tree or a building touches the body. If no level stands
     free, the axis does not change.
     """
-    from scipy.ndimage import label
+    place = *axis.tolist(), body.base
+    east, north, free = _centred(*_columns(around), *place, body.height, voxel_size)
+    return axis + np.array([east, north]), free
 
-    slim = max(SLIM_M, SLIM * body.height)
-    relative = around - np.array([*axis, body.base])
-    low, high = (part * body.height for part in MIDDLE)
-    between = (relative[:, 2] >= low) & (relative[:, 2] <= high)
-    places = relative[between & (np.hypot(relative[:, 0], relative[:, 1]) <= 4 * slim)]
-    at, free = np.zeros(2), 0.0
-    if len(places) == 0:
-        return axis, free
-    steps = np.rint((places - places.min(axis=0)) / voxel_size).astype(int)
-    volume = np.zeros(steps.max(axis=0) + 1, bool)
-    volume[tuple(steps.T)] = True
-    within_level = np.zeros((3, 3, 3))
-    within_level[:, :, 1] = 1
-    piece = label(volume, within_level)[0][tuple(steps.T)]
-    # Level by level, so that all levels are measured at once.
-    order = np.argsort(steps[:, 2], kind="stable")
-    places, level, piece = places[order], steps[order, 2], piece[order]
+
+def _columns(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """x, y and z (N,) of positions (N, 3)."""
+    x, y, z = (np.ascontiguousarray(column) for column in xyz.T)
+    return x, y, z
+
+
+@numba.njit(**EXACT)
+def _measured(
+    x, y, z, east, north, elevations, foot_radius, voxel_size
+):  # pragma: no cover - compiled
+    """Base, height and upright of ``Body``."""
+    distance = np.hypot(x - east, y - north)
+    lowest_seen = elevations.min()
+    near_foot = np.append(z[distance <= foot_radius], lowest_seen)
+    # A percentile, because a single return below the ground would make a bush as tall as a tower.
+    lowest = _percentile(near_foot, LOWEST / 100)
+    detected = np.unique(np.rint((elevations - lowest_seen) / voxel_size).astype(np.int64))
+    middle = int((np.median(elevations) - lowest_seen) / voxel_size)
+    head = _unbroken(detected, middle, STRAY_GAP / voxel_size)
+    height = lowest_seen + head * voxel_size - lowest
+    slim = max(SLIM_M, SLIM * height)
+    near = np.empty(len(z), np.bool_)
+    for i in range(len(z)):
+        leg = z[i] - lowest < MIDDLE[0] * height
+        near[i] = distance[i] <= (2 * slim if leg else slim)
+    # Levels count from the lowest detected voxel, which is on the lattice.
+    levels = np.unique(np.rint((z[near] - lowest_seen) / voxel_size).astype(np.int64))
+    foot = int(np.rint((lowest - lowest_seen) / voxel_size))
+    seen = np.unique(np.concatenate((levels, detected[detected <= head])))
+    top = _unbroken(seen, middle, TOP_GAP / voxel_size)
+    upright = ((levels >= foot) & (levels <= top)).sum() / (top - foot + 1)
+    base = lowest - voxel_size / 2
+    return base, lowest_seen + (top + 0.5) * voxel_size - base, upright
+
+
+@numba.njit(**EXACT)
+def _unbroken(levels, start, gap):  # pragma: no cover - compiled
+    """The highest of ascending levels (N,) above ``start`` before a gap wider than ``gap``."""
+    last = start
+    for level in levels:
+        if level > start:
+            if level - last > gap:
+                break
+            last = level
+    return last
+
+
+@numba.njit(**EXACT)
+def _percentile(values, share):  # pragma: no cover - compiled
+    """As ``np.percentile`` interpolates it, to the bit."""
+    ordered = np.sort(values)
+    at = (len(ordered) - 1) * share
+    below = int(at)
+    if below + 1 >= len(ordered):
+        return ordered[-1]
+    low, high, part = ordered[below], ordered[below + 1], at - below
+    return high - (high - low) * (1 - part) if part >= 0.5 else low + (high - low) * part
+
+
+@numba.njit(**EXACT)
+def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cover - compiled
+    """What ``centre_body`` gives, the axis relative to (``east``, ``north``)."""
+    slim = max(SLIM_M, SLIM * height)
+    places = np.empty((len(x), 3))
+    n = 0
+    for i in range(len(x)):
+        px, py, pz = x[i] - east, y[i] - north, z[i] - base
+        if MIDDLE[0] * height <= pz <= MIDDLE[1] * height and np.hypot(px, py) <= 4 * slim:
+            places[n] = px, py, pz
+            n += 1
+    if n == 0:
+        return 0.0, 0.0, 0.0
+    places = places[:n]
+    level, piece, n_pieces = _pieces(places, voxel_size)
+    at_east, at_north, free = 0.0, 0.0, 0.0
     for multiple in SEARCH_RADII:
-        near = np.hypot(places[:, 0] - at[0], places[:, 1] - at[1]) <= multiple * slim
-        if not near.any():
+        reached = np.zeros(n_pieces, np.bool_)
+        for i in range(n):
+            if np.hypot(places[i, 0] - at_east, places[i, 1] - at_north) <= multiple * slim:
+                reached[piece[i]] = True
+        if not reached.any():
             continue
-        reached = np.zeros(piece.max() + 1, bool)
-        reached[piece[near]] = True
-        in_body = reached[piece]
-        _, first = np.unique(level[in_body], return_index=True)
-        least = np.minimum.reduceat(places[in_body, :2], first)
-        greatest = np.maximum.reduceat(places[in_body, :2], first)
-        stands_free = (greatest - least + voxel_size).max(axis=1) <= 2 * slim + voxel_size
-        if stands_free.any():
-            at = np.median((least + greatest)[stands_free] / 2, axis=0)
-            free = float(stands_free.mean())
-    return axis + at, free
+        n_levels = level.max() + 1
+        least, greatest = np.full((n_levels, 2), np.inf), np.full((n_levels, 2), -np.inf)
+        for i in range(n):
+            if reached[piece[i]]:
+                for k in range(2):
+                    least[level[i], k] = min(least[level[i], k], places[i, k])
+                    greatest[level[i], k] = max(greatest[level[i], k], places[i, k])
+        middles = np.empty((n_levels, 2))
+        n_seen = n_free = 0
+        for k in range(n_levels):
+            if greatest[k, 0] < least[k, 0]:
+                continue
+            n_seen += 1
+            wide = max(greatest[k, 0] - least[k, 0], greatest[k, 1] - least[k, 1]) + voxel_size
+            if wide <= 2 * slim + voxel_size:
+                middles[n_free] = (least[k] + greatest[k]) / 2
+                n_free += 1
+        if n_free:
+            at_east, at_north = np.median(middles[:n_free, 0]), np.median(middles[:n_free, 1])
+            free = n_free / n_seen
+    return at_east, at_north, free
+
+
+@numba.njit(**EXACT)
+def _pieces(places, voxel_size):  # pragma: no cover - compiled
+    """Level (N,) of voxels (N, 3) m, number (N,) of the piece of its level that each is connected
+    to, also over a corner, and the number of pieces."""
+    n = len(places)
+    steps = np.empty((n, 3), np.int64)
+    for k in range(3):
+        steps[:, k] = np.rint((places[:, k] - places[:, k].min()) / voxel_size).astype(np.int64)
+    shape = steps[:, 0].max() + 3, steps[:, 1].max() + 3, steps[:, 2].max() + 1
+    at = np.full(shape, -1, np.int64)  # with a border
+    for i in range(n):
+        at[steps[i, 0] + 1, steps[i, 1] + 1, steps[i, 2]] = i
+    piece, waiting = np.full(n, -1, np.int64), np.empty(n, np.int64)
+    n_pieces = 0
+    for i in range(n):
+        same = at[steps[i, 0] + 1, steps[i, 1] + 1, steps[i, 2]]
+        if same != i or piece[i] >= 0:
+            continue
+        piece[i], waiting[0], n_waiting = n_pieces, i, 1
+        while n_waiting:
+            n_waiting -= 1
+            a, b, c = steps[waiting[n_waiting]]
+            for other in at[a : a + 3, b : b + 3, c].flat:
+                if other >= 0 and piece[other] < 0:
+                    piece[other], waiting[n_waiting] = n_pieces, other
+                    n_waiting += 1
+        n_pieces += 1
+    for i in range(n):
+        piece[i] = piece[at[steps[i, 0] + 1, steps[i, 1] + 1, steps[i, 2]]]
+    return steps[:, 2], piece, n_pieces

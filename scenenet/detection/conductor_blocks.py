@@ -6,8 +6,10 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 
+import numba
 import numpy as np
 
+from scenenet.core.compilation import EXACT
 from scenenet.detection.conductor_rules import (
     HIGHEST_M,
     LINE_CELL_M,
@@ -48,11 +50,14 @@ class ConductorBlocks:
     def near(self, place: np.ndarray, radius: float) -> Block:
         """What is within a radius in m of a place (2,) m."""
         blocks = [self._block(number) for number in _numbers(place, radius)]
-        found = zip(*(block.result() for block in blocks), strict=True)
-        places, directions, others = (np.concatenate(parts) for parts in found)
-        inside = np.hypot(*(places[:, :2] - place).T) <= radius
-        beside = np.hypot(*(others[:, :2] - place).T) <= radius
-        return places[inside], directions[inside], others[beside]
+        found = [block.result() for block in blocks]
+        inside = [_within(places, *place, radius) for places, _, _ in found]
+        beside = [_within(others, *place, radius) for _, _, others in found]
+        return (
+            np.concatenate([block[0][rows] for block, rows in zip(found, inside, strict=True)]),
+            np.concatenate([block[1][rows] for block, rows in zip(found, inside, strict=True)]),
+            np.concatenate([block[2][rows] for block, rows in zip(found, beside, strict=True)]),
+        )
 
     def _block(self, number: tuple[int, int]) -> Future[Block]:
         """A block, looked for or not; those that were asked for last stay in memory."""
@@ -88,6 +93,16 @@ def _numbers(place: np.ndarray, radius: float) -> Iterator[tuple[int, int]]:
     for x in range(low[0], high[0] + 1):
         for y in range(low[1], high[1] + 1):
             yield x, y
+
+
+@numba.njit(**EXACT)
+def _within(xyz, x, y, radius):  # pragma: no cover - compiled
+    """Rows of positions (N, 3) m within a planar radius in m of a place."""
+    rows, n = np.empty(len(xyz), np.int64), 0
+    for i in range(len(xyz)):
+        rows[n] = i
+        n += np.hypot(xyz[i, 0] - x, xyz[i, 1] - y) <= radius
+    return rows[:n]
 
 
 def _one_per_cell(points: np.ndarray, size: float) -> np.ndarray:

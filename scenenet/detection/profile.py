@@ -13,7 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numba
 import numpy as np
+
+from scenenet.core.compilation import EXACT
 
 SLIM = 1 / 8
 """Largest half width of a body as a share of its height."""
@@ -149,10 +152,8 @@ def _search(
         if cell not in summed:
             n = max(other.n for other in prisms if other.cell == cell)
             summed[cell] = _summed(s, t, h, cell, n, level, n_levels)
-        around = prism.crop(summed[cell])
-        within = _boxes(around, reach)[:, margin:-margin, margin:-margin]
-        free = (within > 0) & (_boxes(around, reach + margin) == within)
-        count = free.sum(axis=0)
+        around = summed[cell], (summed[cell].shape[1] - 1) // 2 - prism.n, reach, margin
+        count = _free_levels(*around)
         share = float(count.max()) / n_levels
         worth = share * WIDER ** np.log2(width / WIDTHS_M[0])
         if worth > merit + 1e-9:
@@ -162,7 +163,7 @@ def _search(
             same = at[np.abs(at - nearest).max(axis=1) <= max(reach, margin)]
             centre = same.mean(axis=0) * cell
             i, j = nearest + (count.shape[0] - 1) // 2
-            points = float(within[:, i, j][free[:, i, j]].mean())
+            points = _points_inside(*around, i, j)
             merit, best = worth, (share, width, centre, points)
     return best
 
@@ -189,12 +190,6 @@ class _Prism(NamedTuple):
         reach, margin = round(width / cell), round(max(GAP_M, GAP_SHARE * width) / cell)
         return cls(cell, reach, margin, round(shift / cell) + reach + margin + 1)
 
-    def crop(self, summed: np.ndarray) -> np.ndarray:
-        """The part of the sums (L, C, C) of a wider prism that this one needs."""
-        beside = (summed.shape[1] - 1) // 2 - self.n
-        inside = slice(beside, summed.shape[1] - beside)
-        return summed[:, inside, inside]
-
 
 def _summed(
     s: np.ndarray, t: np.ndarray, h: np.ndarray, cell: float, n: int, level: float, n_levels: int
@@ -203,21 +198,75 @@ def _summed(
     C = 2n + 2. The approximate axis is in the middle of the central one of 2n + 1 cells."""
     i = np.floor(s / cell + 0.5).astype(int) + n
     j = np.floor(t / cell + 0.5).astype(int) + n
-    k = np.floor(h / level).astype(int)
-    size = 2 * n + 1
-    inside = (i >= 0) & (i < size) & (j >= 0) & (j < size) & (k >= 0) & (k < n_levels)
-    shape = n_levels, size + 1, size + 1
-    cells = np.ravel_multi_index((k[inside], i[inside] + 1, j[inside] + 1), shape)
-    summed = np.zeros(shape, np.int32)
-    np.add.at(summed.reshape(-1), cells, 1)
-    np.cumsum(summed, axis=1, dtype=np.int32, out=summed)
-    return np.cumsum(summed, axis=2, dtype=np.int32, out=summed)
+    return _sums(i, j, np.floor(h / level).astype(int), 2 * n + 1, n_levels)
 
 
-def _boxes(summed: np.ndarray, reach: int) -> np.ndarray:
-    """Points per level in the square of 2 * reach + 1 cells about each cell that it fits around."""
-    w = 2 * reach + 1
-    return summed[:, w:, w:] - summed[:, :-w, w:] - summed[:, w:, :-w] + summed[:, :-w, :-w]
+@numba.njit(**EXACT)
+def _sums(i, j, k, size, n_levels):  # pragma: no cover - compiled
+    """What ``_summed`` gives, for points in cells i, j (N,) of ``size`` and levels k (N,)."""
+    summed = np.zeros((n_levels, size + 1, size + 1), np.int32)
+    for p in range(len(i)):
+        if 0 <= i[p] < size and 0 <= j[p] < size and 0 <= k[p] < n_levels:
+            summed[k[p], i[p] + 1, j[p] + 1] += 1
+    for level in summed:
+        for a in range(1, size + 1):
+            row = 0
+            for b in range(1, size + 1):
+                row += level[a, b]
+                level[a, b] = level[a - 1, b] + row
+    return summed
+
+
+@numba.njit(**EXACT)
+def _free_levels(summed, beside, reach, margin):  # pragma: no cover - compiled
+    """(A, A) int32 number of the levels at which the prism about each cell has points inside and
+    none in the air around it.
+
+    Args:
+        summed: of ``_summed``, for a prism that is ``beside`` cells wider to each side.
+        reach, margin: of the prism.
+    """
+    wide, whole = 2 * reach + 1, 2 * (reach + margin) + 1
+    side = summed.shape[1] - 2 * beside - whole
+    count = np.zeros((side, side), np.int32)
+    for level in summed:
+        if level[-1, -1] == 0:
+            continue
+        for a in range(side):
+            low, high = beside + a, beside + a + whole
+            # Slices from the first cell of each, so that the loop runs in vector registers.
+            west, east = level[low, beside:], level[high, beside:]
+            far_west, far_east = level[low, beside + whole :], level[high, beside + whole :]
+            low, high = low + margin, low + margin + wide
+            first, last = beside + margin, beside + margin + wide
+            near, beyond = level[low, first:], level[high, first:]
+            far_near, far_beyond = level[low, last:], level[high, last:]
+            free = count[a]
+            for b in range(side):
+                within = far_beyond[b] - far_near[b] - beyond[b] + near[b]
+                around = far_east[b] - far_west[b] - east[b] + west[b]
+                free[b] += (within > 0) & (around == within)
+    return count
+
+
+@numba.njit(**EXACT)
+def _points_inside(summed, beside, reach, margin, a, b):  # pragma: no cover - compiled
+    """Mean number of points in the free levels of the prism about cell (a, b) of
+    ``_free_levels``."""
+    wide, whole = 2 * reach + 1, 2 * (reach + margin) + 1
+    a, b = beside + a, beside + b
+    points = levels = 0
+    for level in summed:
+        within = _box(level, a + margin, b + margin, wide)
+        if within > 0 and _box(level, a, b, whole) == within:
+            points, levels = points + within, levels + 1
+    return points / levels
+
+
+@numba.njit(**EXACT)
+def _box(level, a, b, w):  # pragma: no cover - compiled
+    """Points in the square of ``w`` cells from a cell of the sums (C, C) of a level."""
+    return level[a + w, b + w] - level[a, b + w] - level[a + w, b] + level[a, b]
 
 
 def _taper(

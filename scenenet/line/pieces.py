@@ -7,10 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from scenenet.core.compilation import COMPILED
-
-EXACT = COMPILED | {"fastmath": False}
-"""A product and a sum stay two instructions: cells are the same on every machine."""
+from scenenet.core.compilation import EXACT
 
 WINDOW_M, SHORTEST_WINDOW_M, WINDOWS = 12.0, 4.0, 4
 """m, length of a piece: a wire of a parameter of 300 m bends by 6 cm over it. In a short stretch of

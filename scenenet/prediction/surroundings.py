@@ -7,8 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
 
+import numba
 import numpy as np
 
+from scenenet.core.compilation import EXACT
 from scenenet.prediction.work.tiling import EDGE, TileSpool
 
 KEPT_TILES = 64
@@ -44,17 +46,26 @@ class _Positions:
 
     def around(self, place: np.ndarray, radius: float) -> np.ndarray:
         """(3, m) m, those within a planar radius of a place (2,), in their order."""
-        east, north = self.columns[:2] - place[:, None]
-        squared = east * east
-        squared += north * north
-        inside = squared <= (radius + ROUNDING_M) ** 2
-        rows = np.flatnonzero(inside)
-        # Squares are rounded, so the distance itself decides at the border.
-        border = rows[squared[rows] > max(radius - ROUNDING_M, 0.0) ** 2]
-        if len(border):
-            inside[border] = np.hypot(east[border], north[border]) <= radius
-            rows = np.flatnonzero(inside)
-        return self.columns[:, rows]
+        x, y, z = self.columns
+        return _around(x, y, z, *place.tolist(), radius)
+
+
+@numba.njit(nogil=True, **EXACT)
+def _around(x, y, z, east, north, radius):  # pragma: no cover - compiled
+    """(3, m) m, the positions (n,) within a planar radius of a place, in their order."""
+    rows, n = np.empty(len(x), np.int64), 0
+    # Squares are rounded, so the distance itself decides at the border.
+    near, far = max(radius - ROUNDING_M, 0.0) ** 2, (radius + ROUNDING_M) ** 2
+    for i in range(len(x)):
+        dx, dy = x[i] - east, y[i] - north
+        squared = dx * dx + dy * dy
+        rows[n] = i
+        n += squared <= near or (squared <= far and np.hypot(dx, dy) <= radius)
+    found = np.empty((3, n))
+    for k in range(n):
+        i = rows[k]
+        found[0, k], found[1, k], found[2, k] = x[i], y[i], z[i]
+    return found
 
 
 class SurveySurroundings:

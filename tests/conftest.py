@@ -38,7 +38,9 @@ hypothesis.settings.register_profile(
 hypothesis.settings.register_profile("explore", deadline=None, max_examples=2000)
 hypothesis.settings.load_profile("same-each-time")
 
-pytest_plugins = ["fixtures.called", "fixtures.noisy_lines", "fixtures.result_folder"]
+pytest_plugins = [
+    *("fixtures.called", "fixtures.empty_store", "fixtures.noisy_lines", "fixtures.result_folder"),
+]
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -6,11 +6,14 @@ Nothing heavy is imported, so that the workflow can look at the file while it pl
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import os
+import re
 import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 from scenenet.core.errors import InputError
@@ -29,6 +32,9 @@ WITHOUT_RUNS = frozenset({"alembic_version", "workspaces"})
 
 UPGRADE = "import sys; from mlflow.db import commands; commands(['upgrade', sys.argv[1]])"
 """``mlflow db upgrade`` without the other commands of MLflow, whose import takes 2 s."""
+
+REVISION = re.compile(r"""^(revision|down_revision)\b[^=]*= *["'](\w+)["']""", re.MULTILINE)
+"""In a migration of MLflow: the schema that it makes, and the one that it begins with."""
 
 
 class DatabaseLockedError(InputError):
@@ -202,10 +208,20 @@ def _has_rows(connection: sqlite3.Connection, tables: set[str]) -> bool:
     )
 
 
+@cache
 def _schema_revisions() -> tuple[str | None, set[str]]:
-    """The schema of the installed MLflow, and all earlier ones."""
-    import mlflow
-    from alembic.script import ScriptDirectory
+    """The schema of the installed MLflow, and all schemas that it knows.
 
-    script = ScriptDirectory(str(Path(mlflow.__file__).parent / "store" / "db_migrations"))
-    return script.get_current_head(), {step.revision for step in script.walk_revisions()}
+    Its migrations are read as text: to run them imports MLflow, which takes seconds.
+    """
+    mlflow = importlib.util.find_spec("mlflow")
+    if mlflow is None or mlflow.origin is None:
+        raise ModuleNotFoundError("No module named 'mlflow'", name="mlflow")
+    steps = Path(mlflow.origin).parent / "store" / "db_migrations" / "versions"
+    before = {}
+    for step in steps.glob("*.py"):
+        numbers = dict(REVISION.findall(step.read_text(encoding="utf-8")))
+        if "revision" in numbers:
+            before[numbers["revision"]] = numbers.get("down_revision")
+    newest = before.keys() - before.values()
+    return next(iter(newest), None), set(before)

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from scenenet.core.errors import InputError
+from scenenet.tracking import database
 from scenenet.tracking.database import DatabaseLockedError, check_schema, reading
 from scenenet.tracking.registry import register_champions
 from scenenet.tracking.run_log import RunGroup, RunRecord, log_runs
@@ -71,8 +72,20 @@ def locked(database: Path):
         connection.close()
 
 
-def test_a_creation_that_is_killed_leaves_no_half_made_store(tmp_path):
+def half_made(database: Path) -> None:
+    """A database as an interrupted ``mlflow db upgrade`` leaves it: old tables without rows."""
+    with contextlib.closing(sqlite3.connect(database)) as connection:
+        for table in ("experiments", "runs", "tags", "metrics", "params"):
+            connection.execute(f"CREATE TABLE {table} (name TEXT)")
+        connection.execute("CREATE TABLE alembic_version (version_num TEXT)")
+        connection.execute("INSERT INTO alembic_version VALUES ('451aebb31d03')")
+        connection.commit()
+
+
+def test_a_half_made_store_is_created_from_scratch_and_a_killed_creation_leaves_none(tmp_path):
     database = tmp_path / "mlflow.db"
+    half_made(database)
+    assert not check_schema(f"sqlite:///{database}")
 
     def creating() -> subprocess.Popen:
         """A process that creates the store, as soon as it has begun."""
@@ -106,21 +119,14 @@ def test_a_creation_that_is_killed_leaves_no_half_made_store(tmp_path):
     assert not list(tmp_path.glob(".mlflow.db.*")), "what the killed processes left is still there"
 
 
-def half_made(database: Path) -> None:
-    """A database as an interrupted ``mlflow db upgrade`` leaves it: old tables without rows."""
-    with contextlib.closing(sqlite3.connect(database)) as connection:
-        for table in ("experiments", "runs", "tags", "metrics", "params"):
-            connection.execute(f"CREATE TABLE {table} (name TEXT)")
-        connection.execute("CREATE TABLE alembic_version (version_num TEXT)")
-        connection.execute("INSERT INTO alembic_version VALUES ('451aebb31d03')")
-        connection.commit()
+def test_the_schemas_that_mlflow_knows_are_those_of_its_migrations():
+    import mlflow
+    from alembic.script import ScriptDirectory
 
-
-def test_a_half_made_store_is_created_from_scratch(tmp_path):
-    half_made(tmp_path / "mlflow.db")
-    assert not check_schema(f"sqlite:///{tmp_path / 'mlflow.db'}")
-    subprocess.run([sys.executable, "-c", CREATE], cwd=tmp_path, check=True)
-    assert check_schema(f"sqlite:///{tmp_path / 'mlflow.db'}")
+    script = ScriptDirectory(str(Path(mlflow.__file__).parent / "store" / "db_migrations"))
+    newest, known = database._schema_revisions()
+    assert newest == script.get_current_head()
+    assert known == {step.revision for step in script.walk_revisions()}
 
 
 def test_an_older_store_that_was_used_is_not_taken_for_a_half_made_one(tmp_path):

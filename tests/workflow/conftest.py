@@ -37,9 +37,10 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory, project_root, recorded) -> Project:
+def finished(tmp_path_factory, project_root, recorded, empty_database) -> Project:
     """The workflow after its first run: two synthetic surveys to train on and a recorded one that
-    is only classified. Not to be changed; take ``project`` for that."""
+    is only classified. Its store of MLflow was there, with no runs; ``test_module`` has one made.
+    Not to be changed; take ``project`` for that."""
 
     def make(shared: Path) -> None:
         # It uses the package of the repository, which may be compiled already. The tests change
@@ -48,6 +49,7 @@ def finished(tmp_path_factory, project_root, recorded) -> Project:
         first = Project(folder, package=project_root, forked=True)
         copy_parts(project_root, folder, PARTS)
         _configure(first, recorded)
+        shutil.copyfile(empty_database, folder / "mlflow.db")
         # One job at a time, because another worker of the tests has the other core, and two jobs
         # would compile the same functions at the same time.
         text = first.run(*ALONE, "--until", *DATASET)

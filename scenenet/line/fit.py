@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from scenenet.core.compilation import COMPILED
+from scenenet.core.compilation import EXACT
 from scenenet.line.catenary import TAUT_M, Catenary
 
 SHORTEST_PARAMETER_M = 60.0
@@ -30,9 +30,6 @@ RAYLEIGH_MEDIAN = 1.177
 ITERATIONS, PLAIN, WIDE, CHANGE = 20, 2, 5, 1e-3
 """Iterations at most, those at the start without weights, in which the curvature is found, those
 after which outliers are told by the full width, and change of a weight at which they end."""
-
-EPSILON = float(np.finfo(float).eps)
-"""Share of the largest singular value below which one is 0."""
 
 
 @dataclass(frozen=True)
@@ -79,117 +76,116 @@ def fit_catenary(
     Returns:
         The fit in the same frame, or None if the points do not say where the wire is.
     """
-    known = (0.0, 0.0) if prior is None else (prior.curvature, NOISE_M / prior.spread)
-    weights, distance = start.astype(float), np.empty(len(stz))
+    known = None if prior is None else (prior.curvature, NOISE_M / prior.spread)
     s, t, z = np.ascontiguousarray(stz.T)
-    shape = _iterated(s, t, z, weights, distance, known, width)
+    weights = start.astype(float)
+    curvature, rise = 0.0 if prior is None else prior.curvature, 0.0
+    for number in range(ITERATIONS):
+        used = weights > 0
+        if used.sum() < 4:
+            return None
+        low, high = float(s[used].min()), float(s[used].max())
+        length = high - low
+        if length <= 0:
+            return None
+        bowed = _bowed(s, low, length)
+        beside = _solve(bowed, t, weights, (0.0, NOISE_M / (BLOWOUT * length)))
+        stretch = np.hypot(1.0, (beside[1] - beside[0]) / length)  # per metre along s
+        # z is nearly linear in the heights of the ends and 1 / c: a parabola, and a small rest
+        # that the last curvature gives.
+        basis, above = _hung(bowed, z, length * stretch, rise, curvature)
+        first, last, curvature = _solve(basis, above, weights, known)
+        rise = float(last - first)
+        curvature = float(np.clip(curvature, 1 / TAUT_M, 1 / SHORTEST_PARAMETER_M))
+        catenary = Catenary(
+            (low, float(beside[0]), float(first)), (high, float(beside[1]), float(last)),
+            1 / curvature, float(beside[2]),
+        )  # fmt: skip
+        distance = _distance(s, t, z, catenary)
+        spread = max(NOISE_M, float(np.median(distance[used])) / RAYLEIGH_MEDIAN)
+        # From wide to narrow: the first fits are those of all points, outliers too.
+        scale = min(TUKEY * spread, width * 2.0 ** max(WIDE - number, 0))
+        if number < PLAIN:
+            continue
+        before = weights
+        weights = np.where(distance < scale, (1 - (distance / scale) ** 2) ** 2, 0.0)
+        if number > PLAIN + WIDE and np.abs(weights - before).max() < CHANGE:
+            break
     used = weights > 0
-    if shape is None or used.sum() < 4:
+    if used.sum() < 4:
         return None
-    low, high, left, left_end, first, last, curvature, blowout = shape
-    catenary = Catenary((low, left, first), (high, left_end, last), 1 / curvature, blowout)
     along, _ = catenary.along(stz)
     ends = catenary.between(float(along[used].min()), float(along[used].max()))
     return Fit(ends, weights, float(np.sqrt(np.mean(distance[used] ** 2))))
 
 
-@numba.njit(**COMPILED)
-def _iterated(s, t, z, weights, distance, known, width):  # pragma: no cover - compiled
-    """The last of the catenaries that are fitted: s of its ends, t of both, z of both, 1 / c and
-    blowout; None where too few points have a weight.
-
-    Args:
-        s, t, z: (n,) m.
-        weights: (n,), changed to those of the fit.
-        distance: (n,) m, overwritten: from the catenary.
-        known: prior curvature and its weight, 0 for none.
-        width: as ``fit_catenary`` takes it.
-    """
-    n = len(s)
-    across, above, rest = np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
-    curvature, rise = known[0], 0.0
-    shape = (0.0,) * 8
-    for number in range(ITERATIONS):
-        used = np.flatnonzero(weights > 0)
-        if len(used) < 4:
-            return None
-        low, high = s[used].min(), s[used].max()
-        length = high - low
-        if length <= 0:
-            return None
-        for i in range(n):
-            u = (s[i] - low) / length
-            across[i] = 1 - u, u, 4 * u * (1 - u)
-        left, left_end, blowout = _solve(across, t, weights, 0.0, NOISE_M / (BLOWOUT * length))
-        stretch = np.hypot(1.0, (left_end - left) / length)  # per metre along s
-        span = length * stretch
-        # z is nearly linear in the heights of the ends and 1 / c: a parabola, and a small rest
-        # that the last curvature gives.
-        c = 1 / max(curvature, 1 / TAUT_M)
-        lowest = _lowest(span, rise, c)
-        start = np.cosh(lowest / c)
-        for i in range(n):
-            u = across[i, 1]
-            bow = span**2 / 2 * u * (1 - u)
-            above[i] = 1 - u, u, -bow
-            over = c * (np.cosh((u * span - lowest) / c) - start)
-            rest[i] = z[i] - (over - rise * u + curvature * bow)
-        first, last, curvature = _solve(above, rest, weights, *known)
-        rise = last - first
-        curvature = min(max(curvature, 1 / TAUT_M), 1 / SHORTEST_PARAMETER_M)
-        shape = (low, high, left, left_end, first, last, curvature, blowout)
-        _measure(s, t, z, shape, distance)
-        spread = max(NOISE_M, np.median(distance[used]) / RAYLEIGH_MEDIAN)
-        # From wide to narrow: the first fits are those of all points, outliers too.
-        scale = min(TUKEY * spread, width * 2.0 ** max(WIDE - number, 0))
-        if number < PLAIN:
-            continue
-        change = 0.0
-        for i in range(n):
-            weight = (1 - (distance[i] / scale) ** 2) ** 2 if distance[i] < scale else 0.0
-            change = max(change, abs(weight - weights[i]))
-            weights[i] = weight
-        if number > PLAIN + WIDE and change < CHANGE:
-            break
-    return shape
+def _hung(
+    bowed: np.ndarray, z: np.ndarray, span: float, rise: float, curvature: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """What the heights (n,) m of points are linear in, (n, 3), and those heights: without what a
+    catenary is above its parabola. It is further above where the wire is steep."""
+    c = 1 / max(curvature, 1 / TAUT_M)
+    lowest = Catenary((0.0, 0.0, 0.0), (span, 0.0, rise), c).lowest
+    return _parabola(bowed, z, span, span**2, rise, curvature, c, lowest, np.cosh(lowest / c))
 
 
-@numba.njit(**COMPILED)
-def _lowest(length, rise, c):  # pragma: no cover - compiled
-    """``Catenary.lowest``."""
-    return length / 2 - c * np.arcsinh(rise / (2 * c * np.sinh(length / (2 * c))))
+def _distance(s: np.ndarray, t: np.ndarray, z: np.ndarray, catenary: Catenary) -> np.ndarray:
+    """(n,) m, from points to a catenary: the length of ``Catenary.residuals``."""
+    c, lowest = catenary.parameter, catenary.lowest
+    direction, length = catenary.direction.tolist(), catenary.length
+    place = *catenary.start, *direction, length, c, lowest, np.cosh(lowest / c), catenary.blowout
+    return np.asarray(_measured(s, t, z, place))
 
 
-@numba.njit(**COMPILED)
-def _measure(s, t, z, shape, distance):  # pragma: no cover - compiled
-    """Write the distances of points from a catenary into ``distance``: the length of
-    ``Catenary.residuals``."""
-    low, high, left, left_end, first, last, curvature, blowout = shape
-    length, c = np.hypot(high - low, left_end - left), 1 / curvature
-    dx, dy = (high - low) / length, (left_end - left) / length
-    lowest = _lowest(length, last - first, c)
-    start = np.cosh(lowest / c)
+@numba.njit(**EXACT)
+def _bowed(s, low, length):  # pragma: no cover - compiled
+    """(n, 3) shares of the start, of the end and of the middle of a wire."""
+    found = np.empty((len(s), 3))
     for i in range(len(s)):
-        east, north = s[i] - low, t[i] - left
+        u = (s[i] - low) / length
+        found[i] = 1 - u, u, 4 * u * (1 - u)
+    return found
+
+
+@numba.njit(**EXACT)
+def _parabola(bowed, z, span, squared, rise, curvature, c, lowest, at_start):  # pragma: no cover - compiled
+    """What ``_hung`` gives."""
+    basis, above = np.empty_like(bowed), np.empty(len(z))
+    for i in range(len(z)):
+        u = bowed[i, 1]
+        basis[i] = 1 - u, u, -(squared / 2 * u * (1 - u))
+        height = c * (np.cosh((u * span - lowest) / c) - at_start)
+        above[i] = z[i] - (height - rise * u + curvature * squared / 2 * u * (1 - u))
+    return basis, above
+
+
+@numba.njit(**EXACT)
+def _measured(s, t, z, place):  # pragma: no cover - compiled
+    """What ``_distance`` gives."""
+    x, y, bottom, dx, dy, length, c, lowest, at_start, blowout = place
+    distance = np.empty(len(s))
+    for i in range(len(s)):
+        east, north = s[i] - x, t[i] - y
         along = east * dx + north * dy
         u = along / length
         beside = north * dx - east * dy - 4 * blowout * u * (1 - u)
-        height = first + c * (np.cosh((along - lowest) / c) - start)
+        height = bottom + c * (np.cosh((along - lowest) / c) - at_start)
         slope = np.sinh((along - lowest) / c)
-        distance[i] = np.hypot(beside, (z[i] - height) / np.sqrt(1 + slope**2))
+        distance[i] = np.hypot(beside, (z[i] - height) / np.sqrt(1 + slope * slope))
+    return distance
 
 
-@numba.njit(**COMPILED)
-def _solve(basis, values, weights, expected, weight):  # pragma: no cover - compiled
-    """Coefficients (3,) by weighted least squares for a basis (n, 3); the last one is ``expected``
-    with a weight."""
-    normal, towards = np.zeros((3, 3)), np.zeros(3)
-    for i in range(len(values)):
-        for j in range(3):
-            weighted = basis[i, j] * weights[i]
-            towards[j] += weighted * values[i]
-            for k in range(3):
-                normal[j, k] += weighted * basis[i, k]
-    normal[2, 2] += weight**2
-    towards[2] += expected * weight**2
-    return np.linalg.lstsq(normal, towards, 3 * EPSILON)[0]
+def _solve(
+    basis: np.ndarray,
+    values: np.ndarray,
+    weights: np.ndarray,
+    known: tuple[float, float] | None = None,
+) -> np.ndarray:
+    """(k,) coefficients by weighted least squares; ``known`` is a value of the last one and the
+    weight of it."""
+    normal = basis.T @ (basis * weights[:, None])
+    towards = basis.T @ (values * weights)
+    if known is not None:
+        normal[-1, -1] += known[1] ** 2
+        towards[-1] += known[0] * known[1] ** 2
+    return np.linalg.lstsq(normal, towards, rcond=None)[0]

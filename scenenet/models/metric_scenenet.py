@@ -264,9 +264,15 @@ class MetricSceneNet(GeneoModel):
     def section(self, occupancy: Occupancy) -> Section:
         """The cross-section of each occupied voxel. With measured numbers it has empty voxels too,
         because the axis of a wide tower is in the air."""
+        return section_of(occupancy, self._section_offsets(), hollow=self._hollow)
+
+    def _section_offsets(self) -> np.ndarray:
         lengths = self.section_radius, self.metric.section_above
-        offsets = section_offsets(*lengths, self.voxel_size)
-        return section_of(occupancy, offsets, hollow=self.measured and self.linear)
+        return section_offsets(*lengths, self.voxel_size)
+
+    @property
+    def _hollow(self) -> bool:
+        return self.measured and self.linear
 
     @property
     def linear(self) -> bool:
@@ -306,9 +312,10 @@ class MetricSceneNet(GeneoModel):
             above_zero: as ``responder_at``.
         """
         answer = self.responder_at(above_zero=above_zero)
+        offsets = self._section_offsets()
 
         def parts(occupancy: Occupancy, rows: np.ndarray) -> Tensor:
-            section = part_of(self.section(occupancy), rows)
+            section = part_of(section_of(occupancy, offsets, hollow=self._hollow), rows)
             needed = np.unique(section.rows)
             found = answer(occupancy, occupancy.flat()[needed])
             own = section._replace(rows=np.searchsorted(needed, section.rows).astype(np.int32))

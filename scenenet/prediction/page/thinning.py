@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numba
 import numpy as np
+
+from scenenet.core.compilation import EXACT
 
 STEP_M = 0.01
 """m, step of the coordinates in a picture. A pixel is wider."""
@@ -37,11 +40,27 @@ def thinned(xyz: np.ndarray, most: int) -> np.ndarray:
     return xyz[kept]
 
 
-def _one_each(offsets: np.ndarray, cell: float) -> np.ndarray:
+@numba.njit(**EXACT)
+def _one_each(offsets, cell):  # pragma: no cover - compiled
     """Rows of the first of the points (n, 3) m in each cell, ascending; no offset is negative."""
-    steps = np.floor(offsets / cell).astype(np.int64)
-    code = (steps[:, 0] << 42) | (steps[:, 1] << 21) | steps[:, 2]
-    return np.sort(np.unique(code, return_index=True)[1])
+    rows, n = np.empty(len(offsets), np.int64), 0
+    places = 1
+    while places < 2 * len(offsets):
+        places *= 2
+    seen = np.full(places, -1, np.int64)
+    for i in range(len(offsets)):
+        x, y, z = offsets[i]
+        code = np.int64(np.floor(x / cell)) << 42
+        code |= np.int64(np.floor(y / cell)) << 21 | np.int64(np.floor(z / cell))
+        mixed = code * np.int64(0x9E3779B97F4A7C1)
+        at = (mixed ^ (mixed >> 29)) & (places - 1)
+        while seen[at] >= 0 and seen[at] != code:
+            at = (at + 1) & (places - 1)
+        if seen[at] < 0:
+            seen[at] = code
+            rows[n] = i
+            n += 1
+    return rows[:n]
 
 
 def quotas(counts: Sequence[int], weights: Sequence[float], most: int) -> list[int]:

@@ -116,7 +116,12 @@ def fullest_voxel(spool: TileSpool, card: ModelCard) -> int:
 
 
 class TilePredictor:
-    """A model at the voxel size of a survey. Its kernels are sampled once, for all tiles."""
+    """A model at the voxel size of a survey. Its kernels are sampled once, for all tiles.
+
+    Attributes:
+        model: at that voxel size.
+        reach: of the model, voxels (z, y, x).
+    """
 
     def __init__(
         self,
@@ -144,10 +149,11 @@ class TilePredictor:
         from scenenet.models.metric_scenenet import MetricSceneNet
 
         self.model = model.at(voxel_size)
+        self.reach = self.model.reach
         beyond = 0
         if "height" in measurement_named(measurement).needs:
             beyond = columns_around(voxel_size)
-        if max(self.model.reach[1:]) + beyond > EDGE:
+        if max(self.reach[1:]) + beyond > EDGE:
             raise InputError(
                 f"voxels of {voxel_size:g} m are too small for measurement {measurement!r}, which "
                 f"looks for the ground {beyond} voxels beyond what the kernels reach, together at "
@@ -202,7 +208,7 @@ class TilePredictor:
 
         from scenenet.convolution.occupancy import Occupancy
 
-        reach = self.model.reach
+        reach = self.reach
         shape = _with_halo(reach)
         scenes = [spool.around(tile.place, reach) for tile in tiles]
         phi = None
@@ -224,9 +230,7 @@ class TilePredictor:
 
         assert self._first is not None
         answers = self._first.of(spool)
-        z, y, x = (
-            own - before for own, before in zip(self.model.reach, self._first.reach, strict=True)
-        )
+        z, y, x = (own - before for own, before in zip(self.reach, self._first.reach, strict=True))
         reach = z, y, x
         shape = _with_halo(reach)
         scenes = [spool.valued_around(tile.place, reach, answers) for tile in tiles]
@@ -266,7 +270,7 @@ class FirstAnswers:
     def __init__(self, predict: TilePredictor) -> None:
         """Ask nothing yet."""
         self._predict = predict
-        self.reach = predict.model.reach
+        self.reach = predict.reach
         self._kept: OrderedDict[int, np.ndarray] = OrderedDict()
         self._voxels = 0
 

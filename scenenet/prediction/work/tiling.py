@@ -13,8 +13,10 @@ from functools import lru_cache
 from itertools import product
 from types import MappingProxyType
 
+import numba
 import numpy as np
 
+from scenenet.core.compilation import EXACT
 from scenenet.core.errors import InputError
 from scenenet.dataset.voxels import BORDER_M
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
@@ -307,12 +309,12 @@ class TileSpool:
             if code not in self._files:
                 continue
             tile = self.tile(code)
-            zyx = tile.zyx() - low
-            inside = ((zyx >= 0) & (zyx < shape)).all(axis=1)
-            indices.append(np.ravel_multi_index(tuple(zyx[inside].T), tuple(shape)))
-            counts.append(tile.count[inside])
+            corner = np.asarray(tile.place) * EDGE - low
+            rows, index = _within(tile.voxel, *corner.tolist(), *shape.tolist())
+            indices.append(index)
+            counts.append(tile.count[rows])
             if tile.total is not None:
-                totals.append(tile.total[inside])
+                totals.append(tile.total[rows])
         index = np.concatenate([*indices, np.empty(0, np.int64)])
         count = np.concatenate([*counts, np.empty(0, np.int32)])
         order = np.argsort(index, kind="stable")
@@ -337,11 +339,12 @@ class TileSpool:
         for code in _encode(np.asarray(place) + NEIGHBOURS).tolist():
             if code not in self._files:
                 continue
-            value = values(code)
-            zyx = self.tile(code).zyx() - low
-            inside = ((zyx >= 0) & (zyx < shape)).all(axis=1) & (value > 0)
-            indices.append(np.ravel_multi_index(tuple(zyx[inside].T), tuple(shape)))
-            found.append(value[inside])
+            value, tile = values(code), self.tile(code)
+            corner = np.asarray(tile.place) * EDGE - low
+            rows, index = _within(tile.voxel, *corner.tolist(), *shape.tolist())
+            above = value[rows] > 0
+            indices.append(index[above])
+            found.append(value[rows[above]])
         index = np.concatenate(indices)
         order = np.argsort(index, kind="stable")
         return index[order].astype(np.int32), np.concatenate(found)[order]
@@ -371,6 +374,23 @@ class TileSpool:
     def _read(self, kind: str, code: int, dtype: np.dtype) -> np.ndarray:
         parts = [file.read(kind, code, dtype) for file in self._files.get(code, ())]
         return np.concatenate([np.empty(0, dtype), *parts])
+
+
+@numba.njit(**EXACT)
+def _within(voxel, z, y, x, depth, height, width):  # pragma: no cover - compiled
+    """Rows (m,) of the voxels (n,) of a tile that lie in a volume, and their positions in it.
+
+    Args:
+        voxel: positions in the tile.
+        z, y, x: position of the tile in the volume.
+    """
+    rows, at, n = np.empty(len(voxel), np.int64), np.empty(len(voxel), np.int64), 0
+    for i in range(len(voxel)):
+        a = voxel[i] // (EDGE * EDGE) + z
+        b, c = voxel[i] // EDGE % EDGE + y, voxel[i] % EDGE + x
+        rows[n], at[n] = i, (a * height + b) * width + c
+        n += (0 <= a < depth) & (0 <= b < height) & (0 <= c < width)
+    return rows[:n], at[:n]
 
 
 def _by_height(offset: np.ndarray) -> np.ndarray:

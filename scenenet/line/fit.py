@@ -148,7 +148,9 @@ def _bowed(s, low, length):  # pragma: no cover - compiled
 
 
 @numba.njit(**EXACT)
-def _parabola(bowed, z, span, squared, rise, curvature, c, lowest, at_start):  # pragma: no cover - compiled
+def _parabola(
+    bowed, z, span, squared, rise, curvature, c, lowest, at_start
+):  # pragma: no cover - compiled
     """What ``_hung`` gives."""
     basis, above = np.empty_like(bowed), np.empty(len(z))
     for i in range(len(z)):

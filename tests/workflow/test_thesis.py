@@ -133,6 +133,8 @@ def test_times_are_measured_and_memory_is_that_of_a_process_with_torch(finished)
         assert row["inference_ms_128"] > 0
         assert row["training_seconds"] > 0
     assert (table["peak_memory_mb"] > 100).all()
+    alone = read_json(finished.results / "train/scenenet/seed-0/resources.json")["peak_memory_mb"]
+    assert 100 < alone <= table.loc["scenenet", "peak_memory_mb"] + 1  # rounded
     assert "boosted trees" in table.index
 
 

@@ -45,9 +45,23 @@ def _best_first(tower: MeasuredTower) -> tuple[float, float, float]:
 
 
 def _same_body(one: MeasuredTower, other: MeasuredTower) -> bool:
+    """Whether two bodies are one, seen from axes that are close or along the line.
+
+    Side by side, a body and another in it may be a leg and the tower it belongs to.
+    """
+    return same_axis(one, other) or (_overlap(one, other) and not _in_plane(one, other))
+
+
+def _overlap(one: MeasuredTower, other: MeasuredTower) -> bool:
     """Whether two bodies are in one another."""
     apart = one.width / 2 + other.width / 2
-    return same_axis(one, other) or bool(np.hypot(one.x - other.x, one.y - other.y) <= apart)
+    return bool(np.hypot(one.x - other.x, one.y - other.y) <= apart)
+
+
+def _in_plane(one: MeasuredTower, other: MeasuredTower) -> bool:
+    """Whether two bodies stand in one plane across the line, as seen from the first."""
+    offset = np.array([other.x - one.x, other.y - one.y])
+    return bool(abs(offset @ one.structure.along) <= PLANE_M)
 
 
 def _joined(bodies: list[MeasuredTower], points: Surroundings) -> list[list[MeasuredTower]]:
@@ -57,7 +71,10 @@ def _joined(bodies: list[MeasuredTower], points: Surroundings) -> list[list[Meas
         # A leg may be joined to the body amid the conductors and to the other leg.
         own, rest = [body], []
         for tower in towers:
-            part = any(joined(body.structure, other.structure, points) for other in tower)
+            part = any(
+                _overlap(body, other) or joined(body.structure, other.structure, points)
+                for other in tower
+            )
             if part:
                 own += tower
             else:
@@ -83,10 +100,12 @@ def _under_conductors(tower: MeasuredTower, other: MeasuredTower) -> bool:
     """
     along = other.structure.along
     offset = np.array([tower.x - other.x, tower.y - other.y])
-    sides = sides_of(other.spans, along)
+    # Not every conductor may be seen at the tower; its crossarms are as long as they need to be.
+    arms = other.structure.head.reach
+    sides = (-arms, arms, *sides_of(other.spans, along))
     right = float(offset @ across(along))
     return (
         tower.width > POLE_M
         and PLANE_M < abs(offset @ along) <= SHORTEST_SPAN_M
-        and min(sides, default=0.0) - BESIDE_M <= right <= max(sides, default=0.0) + BESIDE_M
+        and min(sides) - BESIDE_M <= right <= max(sides) + BESIDE_M
     )

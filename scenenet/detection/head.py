@@ -1,7 +1,9 @@
-"""The head of a tower: its crossarms, in a plane across the line.
+"""The head of a tower: its crossarms, in a plane across the line, and the members that carry them.
 
 The plane is divided into cells. A cell belongs to a crossarm if points lie in the plane and next to
 none before and behind it: conductors pass through the plane, and a crown is as thick as it is wide.
+Below the crossarms, such cells are the legs of a window or the braces of a portal where they lead
+from the crossarms down to the body.
 """
 
 from __future__ import annotations
@@ -33,10 +35,15 @@ BEYOND, BEYOND_M = 1.0, 0.5
 REACH = 0.4
 """Largest reach of a crossarm as a share of the height."""
 
+FORK = 0.35
+"""Share of the height above which legs of a window, or braces of a portal, carry the crossarms. The
+conductor in the window needs its clearance, which leaves less than two thirds for it and more than
+a third for the body below."""
+
 
 @dataclass(frozen=True)
 class Head:
-    """Crossarms.
+    """Crossarms, and the members that lead down from them to the body.
 
     Attributes:
         cells: (T, H) bool, which cells of the plane belong to them.
@@ -89,25 +96,29 @@ def find_head(
         s, t, h: (N,) m, points in the frame of the tower: along the line, to its right, up.
         profile: the body.
         apart: m, half the distance between the bodies of a portal.
+            Lower points than ``FORK`` of the height may be left out.
         low, high: m above the ground, of the lowest crossarm and the highest conductor.
         reach: m, of the outermost conductor.
     """
     half = float(profile.half_width(np.array([low]))[0])
     furthest = min(reach * (1 + BEYOND), REACH * profile.height) + BEYOND_M
     wide = 2 * int(np.ceil(furthest / CELL_M))
-    tall = int(np.ceil((high - low) / CELL_M)) + 2
+    below = max(int((low - FORK * profile.height) / CELL_M), 0)
+    fork = low - below * CELL_M
+    tall = int(np.ceil((high - low) / CELL_M)) + 2 + below
     left = -wide / 2 * CELL_M
     thick = _thickness(s, t, h, half, apart, low, furthest)
-    inside = _count(t, h, np.abs(s) <= thick, left, low, wide, tall) / thick
+    inside = _count(t, h, np.abs(s) <= thick, left, fork, wide, tall) / thick
     free = thick + 0.1
     beside = (np.abs(s) > free) & (np.abs(s) <= free + AIR_M)
-    outside = _count(t, h, beside, left, low, wide, tall) / AIR_M
-    arm = (inside > 0) & (inside > FREE * outside)
+    outside = _count(t, h, beside, left, fork, wide, tall) / AIR_M
+    member = (inside > 0) & (inside > FREE * outside)
     # A cell has few points; with its neighbours it shows whether a crown is there.
-    arm &= _with_neighbours(inside) > FREE * _with_neighbours(outside)
+    member &= _with_neighbours(inside) > FREE * _with_neighbours(outside)
     middle = left + (np.arange(wide) + 0.5) * CELL_M
     body = np.abs(np.abs(middle) - apart) <= half + CELL_M
-    return Head(_connected(arm, body), left, low, thick)
+    arm = _connected(member[:, below:], body, below)
+    return Head(_with_legs(member, arm, np.abs(middle), apart, below), left, fork, thick)
 
 
 def _count(
@@ -144,18 +155,47 @@ def _thickness(
     count = np.bincount((np.abs(s[beside]) / step).astype(int), minlength=100)
     first = int(np.ceil((half + 1) / step))
     conductors = np.median(count[first : first + 12])
-    n = 0
-    while (n + 1) * step < half and count[n] > 2 * conductors + 1:
-        n += 1
-    return max(n * step + 0.1, ARM_M)
+    # A truss has two faces with little between them, so the outermost of its steps counts.
+    within = count[: max(int(np.ceil(half / step)) - 1, 0)]
+    full = np.flatnonzero(within > 2 * conductors + 1)
+    return max((full[-1] + 1) * step + 0.1 if len(full) else 0.0, ARM_M)
 
 
-def _connected(arm: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """The cells of ``arm`` (T, H) that are connected with the columns ``body`` (T,)."""
+def _connected(arm: np.ndarray, body: np.ndarray, below: int) -> np.ndarray:
+    """The cells of ``arm`` (T, H) that are connected with the columns ``body`` (T,), with ``below``
+    rows of other cells under them."""
     from scipy.ndimage import binary_dilation, label
 
     reachable = arm | body[:, None]
     bridged = binary_dilation(reachable, np.ones((3, 3), bool), iterations=BRIDGE)
     piece, _ = label(bridged, np.ones((3, 3)))
     with_body = np.unique(piece[body])
-    return np.asarray(arm & np.isin(piece, with_body[with_body > 0]))
+    connected = arm & np.isin(piece, with_body[with_body > 0])
+    return np.pad(connected, ((0, 0), (below, 0)))
+
+
+def _with_legs(
+    member: np.ndarray, arm: np.ndarray, away: np.ndarray, apart: float, below: int
+) -> np.ndarray:
+    """The cells of the crossarms (T, H), and those of members that lead down from them.
+
+    Such members lead towards the body, or are between the bodies of a portal: a crown beside the
+    body is further out than what is above it.
+
+    Args:
+        member: (T, H) bool, cells in which something thin stands in free air.
+        away: (T,) m, of the cells from the axis.
+        apart: m, half the distance between the bodies of a portal.
+        below: number of rows below the lowest crossarm.
+    """
+    from scipy.ndimage import binary_dilation
+
+    found = arm.copy()
+    for row in range(below - 1, -1, -1):
+        over = found[:, row + 1 : row + 2 + BRIDGE].any(axis=1)
+        if not over.any():
+            break
+        near = binary_dilation(over, iterations=BRIDGE + 1)
+        outermost = max(float(away[over].max()), apart)
+        found[:, row] = member[:, row] & near & (away <= outermost)
+    return found

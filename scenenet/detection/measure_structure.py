@@ -10,7 +10,7 @@ import numpy as np
 from scenenet.detection.conductor_rules import WINDOW_M
 from scenenet.detection.conductors import Span
 from scenenet.detection.ground import fit_ground
-from scenenet.detection.head import NO_HEAD, find_head
+from scenenet.detection.head import FORK, NO_HEAD, find_head
 from scenenet.detection.line_frame import (
     across,
     direction_of,
@@ -172,7 +172,8 @@ def _with_head(
     lowest = max(lowest, body.height / 2)
     highest = max(body.height, *(span.highest for span in line))
     reach = max(abs(side) for side in sides)
-    s, t, h = line_frame(points, np.array([body.x, body.y]), body.along, body.ground, lowest)
+    from_fork = min(lowest, FORK * body.height)
+    s, t, h = line_frame(points, np.array([body.x, body.y]), body.along, body.ground, from_fork)
     head = find_head(s, t, h, body.profile, body.apart, lowest, highest, reach)
     shape = replace(body, head=head, height=highest + PEAK_M)
     top = max(body.height, float(h[shape.in_arm(s, t, h)].max(initial=0.0)))

@@ -14,8 +14,9 @@ are further apart."""
 TWIN_WIDTH_M = 0.6
 """m, largest half width of a pole of a portal."""
 
-TWIN_UPRIGHT, TWIN_FREE = 0.6, 0.4
-"""Smallest share of the levels at which the second pole has points, and stands free."""
+TWIN_UPRIGHT, TWIN_FREE = 0.6, 0.3
+"""Smallest share of the levels at which the second pole has points, and stands free: a beam and
+braces touch it at a third of them, and vegetation at others."""
 
 BEAM, BEAM_SEEN = 0.5, 0.75
 """Share of the height above which there is a beam, and smallest share of its length with points."""
@@ -40,7 +41,8 @@ def find_twin(
     if profile.foot > TWIN_WIDTH_M:
         return None
     for at in _upright_places(s, t, h, profile.level, height):
-        twin = fit_profile(s, t - at, h, height)
+        # Further away, the first pole may stand more free.
+        twin = fit_profile(s, t - at, h, height, TWIN_WIDTH_M / 2)
         if twin is None or max(abs(twin.s), abs(twin.t)) > TWIN_WIDTH_M / 2:
             continue
         place = at + twin.t

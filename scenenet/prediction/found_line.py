@@ -12,6 +12,7 @@ import numpy as np
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.line.find_line import find_line
 from scenenet.line.hung import REACH_M, LineTower
+from scenenet.line.passed import passed_towers
 from scenenet.line.records import EXPECTED, FOUND_AGAIN, UNHELD, LineNote, SurveyLine
 from scenenet.line.wire_points import WirePoints
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_near
@@ -71,7 +72,7 @@ def find_line_in_survey(
     """Find the lines of a survey, and the towers that they ask for.
 
     Where wires end in the air amid the survey, a tower is expected and looked for once more. It is
-    kept if the line then leads to it.
+    kept if the line then leads to it. Towers that conductors pass without a bend are dropped.
 
     Args:
         wires, towers: what conductors and towers are looked for in.
@@ -81,28 +82,35 @@ def find_line_in_survey(
     points = _wire_points(wires, towers.spool)
     seen = occupied_voxels(towers.spool)
 
-    def between(own: FoundTowers) -> SurveyLine:
-        known = [_in_metres(tower, towers.unit_sizes) for tower in own.towers]
-        return find_line(points, known, seen, progress)
+    def between(own: FoundTowers) -> FoundLine:
+        """The line between towers, less those that it passes: without them it runs on."""
+        while True:
+            known = [_in_metres(tower, towers.unit_sizes) for tower in own.towers]
+            line = find_line(points, known, seen, progress)
+            passed = passed_towers(known, line.conductors)
+            if not passed:
+                return FoundLine(line, own)
+            own = own.without(passed)
 
-    line = between(found)
-    more = _with_expected(line, towers, found)
-    if more is found:
-        return FoundLine(line, found)
-    line = between(more)
-    places = {(tower.x, tower.y) for tower in found.towers}
-    again = {tower.id: tower for tower in more.towers if (tower.x, tower.y) not in places}
-    idle = {note.tower for note in line.notes if note.what == UNHELD} & again.keys()
+    first = between(found)
+    more = _with_expected(first.line, towers, first.towers)
+    if more is first.towers:
+        return first
+    asked = between(more)
+    places = {(tower.x, tower.y) for tower in first.towers.towers}
+
+    def again() -> dict[int, SurveyTower]:
+        return {t.id: t for t in asked.towers.towers if (t.x, t.y) not in places}
+
+    idle = {note.tower for note in asked.line.notes if note.what == UNHELD} & again().keys()
     if idle:
-        more = more.without(idle)
-        line = between(more)
+        asked = between(asked.towers.without(idle))
     planar = towers.unit_sizes[0]
     notes = (
         LineNote(tower.x * planar, tower.y * planar, FOUND_AGAIN, number, 0)
-        for number, tower in again.items()
-        if number not in idle
+        for number, tower in again().items()
     )
-    return FoundLine(replace(line, notes=(*line.notes, *notes)), more)
+    return replace(asked, line=replace(asked.line, notes=(*asked.line.notes, *notes)))
 
 
 def _with_expected(line: SurveyLine, towers: TowerSearch, found: FoundTowers) -> FoundTowers:

@@ -67,3 +67,33 @@ def test_nothing_is_covered_outside_of_the_cells():
     found = head(body(), arm(1.9, 16.0))
     far = np.array([-50.0, 50.0, 0.0, 0.0])
     assert not found.covers(far, np.array([16.0, 16.0, -5.0, 99.0])).any()
+
+
+def leg(bottom, top, low, high, n=80):
+    """A member from ``bottom`` to ``top`` m beside the axis, between two heights."""
+    share = np.linspace(0, 1, n)
+    return np.column_stack(
+        [np.zeros(n), bottom + share * (top - bottom), low + share * (high - low)]
+    )
+
+
+def test_legs_lead_down_from_the_crossarm_to_the_body():
+    found = head(body(), arm(3.4, 16.0), leg(0.5, 3.0, 9.0, 16.0), leg(-0.5, -3.0, 9.0, 16.0))
+    assert covered(found, 1.6, 12.0) and covered(found, -1.6, 12.0)
+    assert not covered(found, 3.0, 12.0)
+
+
+def test_what_stands_below_and_further_out_than_a_crossarm_is_no_leg():
+    beside = leg(3.2, 1.2, 9.0, 13.0)
+    found = head(body(), arm(1.9, 16.0), leg(0.5, 1.6, 13.0, 16.0), beside)
+    assert covered(found, 1.2, 14.8)
+    assert not covered(found, 2.9, 9.6)
+
+
+def test_the_two_faces_of_a_truss_are_one_crossarm():
+    wide = Profile(0.0, 0.0, 2.0, 1.2, 18.0, 0.9, 0.5)
+    faces = [arm(6.0, 16.0) + np.array([y, 0, 0]) for y in (-0.7, 0.7)]
+    s, t, h = np.concatenate([body(), *faces]).T
+    found = find_head(s, t, h, wide, 0.0, 14.0, 18.0, 6.0)
+    assert found.thick > 0.7
+    assert covered(found, 5.5, 16.0)

@@ -10,7 +10,7 @@ import pytest
 from scenenet.detection.conductors import Span
 from scenenet.detection.distinct import distinct_towers
 from scenenet.detection.ground import Ground
-from scenenet.detection.head import NO_HEAD
+from scenenet.detection.head import NO_HEAD, Head
 from scenenet.detection.joined import joined, tower_of
 from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.profile import Profile
@@ -96,3 +96,19 @@ def test_a_pole_may_stand_near_a_tower(window):
     pole = body(window, 2.0, 12.0, height=14.0, profile=thin)
     points = surroundings_in(window.xyz)
     assert len(distinct_towers([measured(pole), measured(body(window, 0.0))], points)) == 2
+
+
+def test_a_leg_that_stands_freer_does_not_hide_the_tower_it_is_in(window):
+    wide = Profile(0.0, 0.0, 3.5, 2.0, HEIGHT, 0.9, 0.5)
+    leg = body(window, 4.0, left=-6.0, right=4.0, profile=wide)
+    axis = body(window, 0.0, left=-8.0, right=8.0, profile=replace(wide, free=0.4))
+    (tower,) = distinct_towers([measured(leg), measured(axis)], surroundings_in(window.xyz))
+    assert tower.structure is axis
+
+
+def test_a_low_body_beside_the_conductors_seen_may_stand_under_a_crossarm(window):
+    head = Head(np.ones((36, 2), bool), -9.0, 17.0, 0.5)
+    tree = body(window, 9.0, 12.0, height=14.0)
+    points = surroundings_in(window.xyz)
+    for shape, towers in ((body(window, 0.0), 2), (body(window, 0.0, head=head), 1)):
+        assert len(distinct_towers([measured(tree), measured(shape)], points)) == towers

@@ -1,0 +1,88 @@
+"""Towers that the line contradicts: conductors pass them without a bend.
+
+Between its supports a conductor is one catenary. Where a tree amid the conductors is taken for a
+tower, they are traced from both sides up to it, and what meets there is the same smooth curve. Over
+whole spans this shows where the conductors near the axis (``scenenet.detection.bends``) do not: a
+crown may hide them on one side, and a tower nearby bends them within the reach of that test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from scenenet.detection.conductor_rules import BEND, BEND_WIRE_M, OPPOSITE, POLE_M
+from scenenet.line.hung import LineTower
+from scenenet.line.records import Conductor
+
+MEETS_M = 2 * BEND_WIRE_M
+"""m, distance of the ends of one conductor at a tower, cut at the plane of its crossarms."""
+
+
+class _End(NamedTuple):
+    """The end of a conductor at a tower.
+
+    Attributes:
+        span: number of its span.
+        xyz: (3,) m.
+        way: (2,) horizontal unit vector away from the tower.
+        rise: m per m in this direction.
+    """
+
+    span: int
+    xyz: np.ndarray
+    way: np.ndarray
+    rise: float
+
+
+def passed_towers(towers: Sequence[LineTower], conductors: Sequence[Conductor]) -> set[int]:
+    """Ids of the towers that conductors pass without a bend, as they pass a tree.
+
+    A pole may be as slim as no tree is, and short spans bend little, so poles are none of them.
+
+    Args:
+        towers: of the survey.
+        conductors: of its lines, m.
+    """
+    at: dict[int, list[_End]] = {tower.id: [] for tower in towers}
+    for conductor in conductors:
+        if conductor.kind != "cable":
+            _add_ends(at, conductor)
+    return {
+        tower.id
+        for tower in towers
+        if (tower.width is None or tower.width > POLE_M)
+        and max(_bends(at[tower.id]), default=np.inf) <= BEND
+    }
+
+
+def _add_ends(at: Mapping[int, list[_End]], conductor: Conductor) -> None:
+    """Add the ends of a conductor to those at its towers."""
+    curve = conductor.catenary
+    left = np.array([-curve.direction[1], curve.direction[0]])
+    blown = 4 * curve.blowout / curve.length * left
+    start, end = curve.slope(np.array([0.0, curve.length])).tolist()
+    for tower, xyz, way, rise in (
+        (conductor.from_tower, curve.start, curve.direction + blown, start),
+        (conductor.to_tower, curve.end, blown - curve.direction, -end),
+    ):
+        if tower in at:
+            unit = way / np.linalg.norm(way)
+            at[tower].append(_End(conductor.span_id, np.array(xyz), unit, rise))
+
+
+def _bends(ends: Sequence[_End]) -> list[float]:
+    """Half the change of slope, or of direction if that is more, m per m, of each conductor that
+    continues at the other side of a tower."""
+    bends = []
+    for number, one in enumerate(ends):
+        for other in ends[number + 1 :]:
+            opposite = one.way @ other.way < np.cos(np.radians(OPPOSITE))
+            if one.span == other.span or not opposite:
+                continue
+            if np.linalg.norm(one.xyz - other.xyz) <= MEETS_M:
+                turn = np.linalg.norm(one.way + other.way)
+                bends.append(max(abs(one.rise + other.rise), float(turn)) / 2)
+    return bends

@@ -1,0 +1,45 @@
+"""Conductors bend at a tower; at a tree amid them they run on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from fixtures.line_scene import PYLONS, known_line
+
+from scenenet.line.find_line import find_line
+from scenenet.line.hung import LineTower
+from scenenet.line.passed import passed_towers
+
+WIDE_M = 4.0
+
+
+@pytest.fixture(scope="module")
+def known():
+    return known_line(**{**PYLONS, "towers": 3})
+
+
+def amid(known, share, width):
+    """What seems to be a tower under the first span, at a share of its length."""
+    one, other = known.towers[:2]
+    x, y = one.place + share * (other.place - one.place)
+    base = one.base + share * (other.base - one.base)
+    return LineTower(99, float(x), float(y), base, one.height + 10.0, width)
+
+
+@pytest.mark.parametrize(("share", "width", "expected"), [(0.4, WIDE_M, {99}), (0.4, 0.5, set())])
+def test_a_tree_amid_the_conductors_is_no_tower_and_a_pole_may_be_one(
+    known, share, width, expected
+):
+    towers = [replace(tower, width=WIDE_M) for tower in known.towers]
+    towers.append(amid(known, share, width))
+    line = find_line(known.points, towers, known.to_its_ends)
+    assert {99} <= {end for span in line.spans for end in (span.from_tower, span.to_tower)}
+    assert passed_towers(towers, line.conductors) == expected
+
+
+def test_a_tower_without_conductors_on_both_sides_is_not_judged(known):
+    towers = [replace(tower, width=WIDE_M) for tower in known.towers]
+    line = find_line(known.points, towers, known.to_its_ends)
+    ended = [c for c in line.conductors if towers[1].id != c.to_tower]
+    assert passed_towers(towers, ended) == set()

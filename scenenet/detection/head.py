@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenenet.detection.conductor_rules import POLE_M
 from scenenet.detection.profile import Profile
 
 ARM_M = 0.35
@@ -32,8 +33,19 @@ BRIDGE = 1
 BEYOND, BEYOND_M = 1.0, 0.5
 """Largest reach of a crossarm beyond the outermost conductor: share of the conductor's, and m."""
 
-REACH = 0.4
-"""Largest reach of a crossarm as a share of the height."""
+REACH, WIDE_REACH = 0.4, 0.5
+"""Largest reach of a crossarm as a share of the height, and that of a body wider than a pole: the
+bridge of a window tower is as long as three quarters of its height, of which the body is known up to
+the bridge, and often only the conductors in the window are seen."""
+
+FACE = 0.1
+"""Smallest number of points in a step of the thickness of a crossarm, as a share of that in its
+fullest step. Both faces of a truss have as many; twigs beside it have few."""
+
+PEAK = 0.4
+"""Largest rise of the legs of a window above the conductors that were seen, as a share of the height
+measured so far. Earth wires on their tops are thin, and often not seen; the body ends at the beam.
+"""
 
 FORK = 0.35
 """Share of the height above which legs of a window, or braces of a portal, carry the crossarms. The
@@ -58,13 +70,17 @@ class Head:
     thick: float
 
     @property
-    def reach(self) -> float:
-        """m, largest distance of a cell from the axis."""
+    def extent(self) -> tuple[float, float]:
+        """m, from the leftmost to the rightmost cell, to the right of the axis; 0, 0 without one."""
         column = np.flatnonzero(self.cells.any(axis=1))
         if len(column) == 0:
-            return 0.0
-        ends = self.left + CELL_M * np.array([column[0], column[-1] + 1])
-        return float(np.abs(ends).max())
+            return 0.0, 0.0
+        return self.left + CELL_M * float(column[0]), self.left + CELL_M * float(column[-1] + 1)
+
+    @property
+    def reach(self) -> float:
+        """m, largest distance of a cell from the axis."""
+        return max(map(abs, self.extent))
 
     def covers(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
         """(N,) bool, whether positions in the plane, (N,) m each, are in a cell."""
@@ -102,10 +118,13 @@ def find_head(
     """
     half = float(profile.half_width(np.array([low]))[0])
     furthest = min(reach * (1 + BEYOND), REACH * profile.height) + BEYOND_M
+    if 2 * half > POLE_M:
+        furthest = WIDE_REACH * profile.height + BEYOND_M
     wide = 2 * int(np.ceil(furthest / CELL_M))
     below = max(int((low - FORK * profile.height) / CELL_M), 0)
     fork = low - below * CELL_M
-    tall = int(np.ceil((high - low) / CELL_M)) + 2 + below
+    known = int(np.ceil((high - low) / CELL_M)) + 2 + below
+    tall = known + int(PEAK * profile.height / CELL_M)
     left = -wide / 2 * CELL_M
     thick = _thickness(s, t, h, half, apart, low, furthest)
     inside = _count(t, h, np.abs(s) <= thick, left, fork, wide, tall) / thick
@@ -116,8 +135,10 @@ def find_head(
     # A cell has few points; with its neighbours it shows whether a crown is there.
     member &= _with_neighbours(inside) > FREE * _with_neighbours(outside)
     middle = left + (np.arange(wide) + 0.5) * CELL_M
-    body = np.abs(np.abs(middle) - apart) <= half + CELL_M
-    arm = _connected(member[:, below:], body, below)
+    body = np.zeros((wide, tall), bool)
+    # Nothing above it is connected with the body through the air: a bird is no peak.
+    body[np.abs(np.abs(middle) - apart) <= half + CELL_M, :known] = True
+    arm = _connected(member, body, below)
     return Head(_with_legs(member, arm, np.abs(middle), apart, below), left, fork, thick)
 
 
@@ -157,16 +178,17 @@ def _thickness(
     conductors = np.median(count[first : first + 12])
     # A truss has two faces with little between them, so the outermost of its steps counts.
     within = count[: max(int(np.ceil(half / step)) - 1, 0)]
-    full = np.flatnonzero(within > 2 * conductors + 1)
+    full = np.flatnonzero(within > max(2 * conductors + 1, FACE * within.max(initial=0)))
     return max((full[-1] + 1) * step + 0.1 if len(full) else 0.0, ARM_M)
 
 
 def _connected(arm: np.ndarray, body: np.ndarray, below: int) -> np.ndarray:
-    """The cells of ``arm`` (T, H) that are connected with the columns ``body`` (T,), with ``below``
-    rows of other cells under them."""
+    """The cells of ``arm`` (T, H) that are connected with those of the ``body`` (T, H), without the
+    ``below`` lowest rows."""
     from scipy.ndimage import binary_dilation, label
 
-    reachable = arm | body[:, None]
+    arm, body = arm[:, below:], body[:, below:]
+    reachable = arm | body
     bridged = binary_dilation(reachable, np.ones((3, 3), bool), iterations=BRIDGE)
     piece, _ = label(bridged, np.ones((3, 3)))
     with_body = np.unique(piece[body])

@@ -77,8 +77,8 @@ def _across(one: Structure, other: Structure) -> float | None:
 def tower_of(bodies: Sequence[Structure]) -> Structure:
     """The tower that joined bodies belong to.
 
-    It is the body that is nearest to the middle of their conductors. Two legs without one between
-    them are the two bodies of a portal.
+    It is the body that is nearest to the middle of their conductors and crossarms. Two legs without
+    one between them are the two bodies of a portal.
     """
     first = bodies[0]
     right = across(first.along)
@@ -88,10 +88,16 @@ def tower_of(bodies: Sequence[Structure]) -> Structure:
     passes = [
         place + side
         for body, place in zip(bodies, at, strict=True)
-        for side in (0.0, *sides_of(body.spans, first.along))
+        for side in (0.0, *sides_of(body.spans, first.along), *_extent(body, first.along))
     ]
     middle = (min(passes) + max(passes)) / 2
     return bodies[int(np.argmin([abs(place - middle) for place in at]))]
+
+
+def _extent(body: Structure, along: np.ndarray) -> list[float]:
+    """m, ends of the crossarms of a body to the right of it, seen ``along`` (2,)."""
+    turned = float(np.sign(body.along @ along))
+    return [turned * end for end in body.head.extent]
 
 
 def _portal(one: Structure, other: Structure, away: float) -> Structure:

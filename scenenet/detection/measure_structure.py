@@ -159,7 +159,7 @@ def _with_head(
     """
     right = across(body.along)
     moved = float((origin - np.array([body.x, body.y])) @ right)
-    body = replace(body, spans=spans)
+    body = replace(body, spans=spans, body_top=body.height)
     line = tuple(
         span
         for span in body.spans

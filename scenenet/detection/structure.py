@@ -36,6 +36,8 @@ class Structure:
         head: the crossarms.
         apart: m, half the distance between the two bodies of a portal, which stand to the left and
             right of the axis; 0 for one body.
+        body_top: m, height of the body alone, while its conductors are known. Legs of a window rise
+            above it.
         upright: share of the levels of the body that have a point.
         spans: directions in which conductors leave.
     """
@@ -51,6 +53,7 @@ class Structure:
     head: Head
     spans: tuple[Span, ...]
     apart: float = 0.0
+    body_top: float = np.inf
 
     @property
     def reach(self) -> float:
@@ -66,8 +69,8 @@ class Structure:
     def carries(self, length: float) -> bool:
         """Whether it carries conductors of this ``length``, the sum of ``Span.followed``.
 
-        The lowest is not above its top, the highest is near it, and they pass the axis on both
-        sides, or close to it on one.
+        The lowest is not above its top, the highest is near that of its body, and they pass the
+        axis on both sides, or close to it on one.
         """
         if length == 0:
             return True
@@ -75,7 +78,8 @@ class Structure:
             return False
         if min(span.lowest for span in self.spans) > self.height + OVER_M:
             return False
-        if max(span.highest for span in self.spans) < UNDER_TOP * self.height:
+        top = min(self.height, self.body_top)
+        if max(span.highest for span in self.spans) < UNDER_TOP * top:
             return False
         sides = sides_of(self.spans, self.along)
         limit = BESIDE_M if 2 * self.profile.top <= POLE_M else BESIDE * self.height

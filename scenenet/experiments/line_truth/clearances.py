@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from scenenet.clearance.danger import places
 from scenenet.clearance.distance import nearest_on
-from scenenet.clearance.records import SurveyClearances
+from scenenet.clearance.records import Clearance, SurveyClearances
 from scenenet.clearance.settings import VEGETATION, ClearanceSettings
 from scenenet.experiments.line_truth.conductors import percentiles, true_one
 from scenenet.line.records import SurveyLine
@@ -106,9 +106,10 @@ def compare(
     true_places = [rows for rows in joined if len(rows) >= settings.few_points]
     listed = [place for place in found.dangers if place.kind == VEGETATION]
     at = np.array([(place.x, place.y, place.z) for place in listed]).reshape(-1, 3)
+    shown = _shown(listed, found, limits.vegetation)
     many = np.array([place.points >= settings.few_points for place in listed], bool)
     missed = sum(
-        not len(at) or cKDTree(at[:, :2]).query(danger[rows, :2])[0].min() > SAME_PLACE_M
+        not len(shown) or cKDTree(shown).query(danger[rows, :2])[0].min() > SAME_PLACE_M
         for rows in true_places
     )
     trees, trees_missed, trees_false = _trees(corridor, hanging, found, settings)
@@ -118,6 +119,21 @@ def compare(
         false=int(np.sum(space.query(at)[0][many] > SAME_POINT_M)) if len(at) else 0,
         trees=trees, trees_missed=trees_missed, trees_false=trees_false,
     )  # fmt: skip
+
+
+def _shown(listed: Sequence[Clearance], found: SurveyClearances, limit: float) -> np.ndarray:
+    """(n, 2) m, where the results show a danger place of vegetation.
+
+    Places that are joined by what is found between them are listed as one, at their worst point.
+    The profile of the span shows the others.
+    """
+    spans = {place.span_id for place in listed}
+    steps = (
+        (step.x, step.y)
+        for step in found.profile
+        if step.kind == VEGETATION and step.distance < limit and step.span_id in spans
+    )
+    return np.array([*((place.x, place.y) for place in listed), *steps]).reshape(-1, 2)
 
 
 def _standing(corridor: Corridor, cloud: PointCloud) -> np.ndarray:

@@ -60,6 +60,16 @@ def test_what_is_not_found_is_missed(survey):
     assert "nan" in table([found])[2]
 
 
+def test_a_place_that_is_listed_with_its_neighbour_is_found(survey):
+    corridor, cloud, line, clearances = survey
+    first = {place.span_id: place for place in reversed(clearances.dangers)}
+    joined = replace(clearances, places=tuple(first.values()))
+    found = compare("lattice_pole", corridor, cloud, line, joined, LIMITS)
+    assert found.places > len(first) and found.missed == 0
+    unseen = compare("lattice_pole", corridor, cloud, line, replace(joined, profile=()), LIMITS)
+    assert unseen.missed > 0
+
+
 def test_what_is_found_and_not_there_is_false(survey):
     corridor, cloud, line, clearances = survey
     moved = [replace(place, x=place.x + 500.0) for place in clearances.dangers if place.points >= 5]

@@ -34,18 +34,17 @@ BEYOND, BEYOND_M = 1.0, 0.5
 """Largest reach of a crossarm beyond the outermost conductor: share of the conductor's, and m."""
 
 REACH, WIDE_REACH = 0.4, 0.5
-"""Largest reach of a crossarm as a share of the height, and that of a body wider than a pole: the
-bridge of a window tower is as long as three quarters of its height, of which the body is known up to
-the bridge, and often only the conductors in the window are seen."""
+"""Largest reach of a crossarm as a share of the height, and that of a body wider than a pole. The
+height of a window tower may be that of its bridge so far, which is about as long, and often only the
+conductors in the window are seen."""
 
 FACE = 0.1
 """Smallest number of points in a step of the thickness of a crossarm, as a share of that in its
 fullest step. Both faces of a truss have as many; twigs beside it have few."""
 
 PEAK = 0.4
-"""Largest rise of the legs of a window above the conductors that were seen, as a share of the height
-measured so far. Earth wires on their tops are thin, and often not seen; the body ends at the beam.
-"""
+"""Largest rise of the legs of a window above the conductors that were seen, as a share of the
+height so far. Earth wires on their tops are thin and often not seen; the body ends at the beam."""
 
 FORK = 0.35
 """Share of the height above which legs of a window, or braces of a portal, carry the crossarms. The
@@ -71,7 +70,7 @@ class Head:
 
     @property
     def extent(self) -> tuple[float, float]:
-        """m, from the leftmost to the rightmost cell, to the right of the axis; 0, 0 without one."""
+        """m, from the leftmost to the rightmost cell, to the right of the axis; 0, 0 for none."""
         column = np.flatnonzero(self.cells.any(axis=1))
         if len(column) == 0:
             return 0.0, 0.0

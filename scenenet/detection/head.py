@@ -34,9 +34,9 @@ BEYOND, BEYOND_M = 1.0, 0.5
 """Largest reach of a crossarm beyond the outermost conductor: share of the conductor's, and m."""
 
 REACH, WIDE_REACH = 0.4, 0.5
-"""Largest reach of a crossarm as a share of the height, and that of a body wider than a pole. The
-height of a window tower may be that of its bridge so far, which is about as long, and often only the
-conductors in the window are seen."""
+"""Largest reach of a crossarm as a share of the height, and that of a body wider than a pole. So
+far, the height of a window tower may be that of its bridge, which is about as long, and often only
+the conductors in the window are seen."""
 
 FACE = 0.1
 """Smallest number of points in a step of the thickness of a crossarm, as a share of that in its

@@ -108,6 +108,13 @@ def test_a_distance_that_is_too_small_for_the_voxels_is_refused(tiles, model, tm
         predict_tile(tmp_path / "a.work", [], model, tmp_path / "out", 60.0, None, SETTINGS)
 
 
+def test_a_model_of_voxels_that_the_tiles_were_not_read_into_is_refused(tiles, model, tmp_path):
+    read_file(tiles / "a.laz", "a.laz", tmp_path / "a.work", 0.75, 1000)
+    with pytest.raises(InputError, match="read without them") as error:
+        predict_tile(tmp_path / "a.work", [], model, tmp_path / "out", 400.0, None, SETTINGS)
+    assert error.value.file == str(model)
+
+
 def test_a_file_that_is_not_the_planned_one_is_not_used(tiles, tmp_path):
     box = (0.0, 0.0, 1.0, 1.0)
     for planned, reason in (

@@ -106,5 +106,13 @@ def predict_tile(
     near = [own, *map(WorkFile.open, neighbours)]
     same = [] if own.system is None else list(belonging(near, own.system))
     layer = None if size == own.lattice.voxel_size else Layer(size)
+    if layer is not None and layer.kind not in own.blocks.kinds:
+        raise InputError(
+            f"the model observes voxels of {size:g} m, and the tiles were read without them, for "
+            "models of other voxel sizes",
+            file=model,
+            remedy="Train the model with the settings of this workflow, or predict the survey with "
+            "scenenet predict",
+        )
     spool = TileSpool(Lattice(size), (each.blocks for each in same), layer)
     predict_file(own, spool, out, trained, card, fullest or 1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -88,6 +88,11 @@ class BlockFile:
             ):
                 blocks[code].append((offset, size))
             self._blocks[kind] = dict(blocks)
+
+    @property
+    def kinds(self) -> Set[str]:
+        """The names of the kinds of blocks."""
+        return self._blocks.keys()
 
     def codes(self, kind: str) -> Iterable[int]:
         """The numbers of the blocks of a kind."""

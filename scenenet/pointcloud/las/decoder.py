@@ -40,10 +40,6 @@ if TYPE_CHECKING:
     import laspy
 
 FRAME = struct.Struct("<cI")
-WATCHDOG_FACTOR = 3
-"""The parent stops a worker that stalls. If the parent has ended, the worker's own alarm does so a
-little later. It is a signal with its default action, so it works inside a decoder that never
-returns to Python."""
 SLOW_IMPORTS = ("pyproj", "requests")
 """Optional imports of laspy that the worker does not need; they take half of its start-up time."""
 
@@ -199,6 +195,9 @@ def send_points(job: Mapping[str, Any], out: BinaryIO) -> None:
 
     No piece crosses the border of two chunks of ``job["chunk"]`` points.
     """
+    # The parent stops a worker that hangs. If the parent has ended, this alarm does so a little
+    # later. It is a signal with its default action, so it works inside a decoder that never returns
+    # to Python.
     signal.alarm(job["watchdog_s"])
     with open_points(job) as reader:
         check_count(reader.header, job, out)

@@ -22,9 +22,11 @@ from scenenet.pointcloud.las import decoder
 from scenenet.pointcloud.las.header import CheckedHeader
 
 STALL_SECONDS = float(os.environ.get("SCENENET_STALL_SECONDS", "8"))
-"""Seconds without a decoded point after which the decoder counts as hung. Points arrive in pieces
-of a few hundred thousand, each within a fraction of a second. A slow network disk may need more:
-set SCENENET_STALL_SECONDS."""
+"""Seconds without a decoded point after which the decoder counts as hung, if it has worked for half
+of them. Points arrive in pieces of a few hundred thousand, each within a fraction of a second."""
+PATIENCE = 8
+"""So many times these seconds are given to a decoder that does not get to work: other programs have
+the processor, or the disk is slow. A disk that needs more: set SCENENET_STALL_SECONDS."""
 MAX_BYTES = 4 * 2**30
 """Address space that the decoder may use. An intact file needs some hundred MB."""
 PIECE_POINTS = 200_000
@@ -43,7 +45,7 @@ def _job(
         "places_only": places_only,
         "chunk": chunk_points,
         "piece": PIECE_POINTS,
-        "watchdog_s": max(1, int(decoder.WATCHDOG_FACTOR * stall_seconds)),
+        "watchdog_s": max(1, int((PATIENCE + 1) * stall_seconds)),
         "max_bytes": MAX_BYTES,
     }
 
@@ -131,6 +133,8 @@ class _Pipe:
         self._worker, self._header, self._stall, self._errors = worker, header, stall, errors
         self._out = worker.stdout
         self._fd = self._out.fileno()
+        self._worked = 0.0
+        """Seconds that the worker had worked when its last data came."""
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._fd, selectors.EVENT_READ)
 
@@ -176,17 +180,26 @@ class _Pipe:
     def _fill(self, view: memoryview, done: int) -> None:
         at = 0
         while at < len(view):
-            if not self._selector.select(self._stall):
-                raise InputError(
-                    f"the decoder hung: it sent no point for {self._stall:g} s after "
-                    f"{_count(done, self._header)}",
-                    file=self._header.path,
-                    remedy=REMEDY + ", or set SCENENET_STALL_SECONDS higher for a slow disk",
-                )
+            self._wait(done)
             got = os.readv(self._fd, [view[at:]])
             if got == 0:
                 raise self._ended(done)
             at += got
+
+    def _wait(self, done: int) -> None:
+        """Wait for data, or until the worker counts as hung."""
+        for turn in range(1, PATIENCE + 1):
+            if self._selector.select(self._stall):
+                self._worked = _seconds_of_work(self._worker.pid)
+                return
+            if _seconds_of_work(self._worker.pid) - self._worked >= self._stall / 2:
+                break
+        raise InputError(
+            f"the decoder hung: it sent no point for {turn * self._stall:g} s after "
+            f"{_count(done, self._header)}",
+            file=self._header.path,
+            remedy=REMEDY + ", or set SCENENET_STALL_SECONDS higher for a slow disk",
+        )
 
     def _ended(self, done: int) -> InputError:
         with contextlib.suppress(subprocess.TimeoutExpired):
@@ -205,3 +218,13 @@ class _Pipe:
             file=self._header.path,
             remedy=REMEDY,
         )
+
+
+def _seconds_of_work(pid: int) -> float:
+    """Processor time of a process so far, s; infinite where the system does not say (Linux does)
+    or the process has ended."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return float("inf")
+    return (int(state[11]) + int(state[12])) / os.sysconf("SC_CLK_TCK")

@@ -55,6 +55,11 @@ class NewSurveys(Settings):
         "surveys", description="folder whose LAS and LAZ files are classified; null for no inbox"
     )
     codes: Codes = Field("asprs", description="class scheme of these files, if they have labels")
+    reviews: PathText | None = Field(
+        "reviews",
+        description="folder with what people decided about the towers of new surveys: SURVEY.csv "
+        "or SURVEY.gpkg, or several files SURVEY.anything.csv; null for none",
+    )
 
 
 class SyntheticSurvey(SyntheticSettings):

@@ -305,6 +305,11 @@ class Results:
             read_table(clearances) if read.line and read.line["clearances"] else None,
         )
 
+    def review_counts(self, survey: str) -> Mapping[str, int] | None:
+        """Number of towers of a survey with each decision; None if nobody reviewed it."""
+        record = self._if_there("review", f"{survey}/{survey}.reviewed.json")
+        return None if record is None else record["counts"]
+
     def provenances(self) -> list[tuple[str, Mapping[str, Any]]]:
         """Every provenance record with its path in the result folder, sorted.
 

@@ -16,6 +16,8 @@ from fixtures.project import PACKAGE, PARTS, Project, copy_parts
 DATASET = ("split", "voxels")
 AS_USERS = "results/train/scenenet/seed-0/resources.json"
 ALONE = ("--cores", "1")
+BESIDE_THE_LINE = (544_905.0, 4_633_970.0)
+"""x and y, m, of a tower that a person adds to the recorded survey."""
 
 
 @pytest.fixture(scope="session")
@@ -75,6 +77,9 @@ def _configure(project: Project, recorded: Path) -> None:
     project.add_row("own", "data/own.laz", "edp", "new")
     (project.folder / "data").mkdir()
     shutil.copyfile(recorded, project.folder / "data" / "own.laz")
+    (project.folder / "reviews").mkdir()
+    x, y = BESIDE_THE_LINE
+    (project.folder / "reviews" / "own.csv").write_text(f"x,y,decision\n{x},{y},add\n")
 
 
 def _tiny(test: dict[str, Any]) -> dict[str, Any]:

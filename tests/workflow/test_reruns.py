@@ -11,7 +11,8 @@ import pytest
 
 pytestmark = pytest.mark.workflow
 
-PREDICTED = {"predict": 1, "prediction_map": 1, "report": 1}
+REVIEWED = {"review": 1, "report": 1}
+PREDICTED = {"predict": 1, "prediction_map": 1, "review_template": 1, **REVIEWED}
 """Jobs after a change of the best model; there is one survey to classify."""
 
 SHOWN = {"figures": 1, "track": 1, "register": 1, "interactive_crop": 3}

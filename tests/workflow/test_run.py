@@ -19,7 +19,7 @@ pytestmark = pytest.mark.workflow
 STAGES = {
     *("synthesize", "check", "towers", "crops", "voxels", "split"),
     *("train", "tune", "champion", "evaluate", "predict"),
-    *("certificate", "inference_time", "voxelisation_time"),
+    *("certificate", "inference_time", "voxelisation_time", "review"),
     *("study", "boosted_trees", "dataset_tables", "tables", "figures", "interactive_crop"),
     *("components", "label_noise", "join_runs"),
     *("track", "track_studies", "track_experiment", "register", "report"),

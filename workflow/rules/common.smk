@@ -14,6 +14,7 @@ from snakemake.exceptions import WorkflowError
 from snakemake.logging import logger
 
 from scenenet.core.code_hash import code_hash
+from scenenet.config.review_files import find_reviews
 from scenenet.config.schema import geneos_in, load, merged
 from scenenet.core.errors import InputError
 from scenenet.figures import CROP_RANKS
@@ -101,13 +102,18 @@ def given_system(survey):
     return {} if crs is None else {"crs": crs}
 
 
-@cache
 def source_print(survey):
     """What identifies a survey: its fingerprint, or the recipe of a synthetic one."""
     if SURVEYS[survey].origin == "synthetic":
         return f"recipe:{digest(synthetic_settings(Path(SURVEYS[survey].path).stem))}"
+    return content_of(SURVEYS[survey].path)
+
+
+@cache
+def content_of(path):
+    """The fingerprint of a file that a user gives."""
     try:
-        return fingerprint(SURVEYS[survey].path, settings.content_below * 1024**2)
+        return fingerprint(path, settings.content_below * 1024**2)
     except InputError:
         return "unreadable"  # its own jobs fail and say why, and no other
 
@@ -225,6 +231,8 @@ NEW = sorted(set(SURVEYS) - set(TRAIN))
 # New surveys of many files, and of one. Tile by tile there is neither a check nor a picture.
 TILED = sorted(PLANS)
 WHOLE = [survey for survey in NEW if survey not in PLANS]
+# New survey -> the files with what people decided about its towers.
+REVIEWS = find_reviews(settings, NEW, ".", warn_once)
 EXPERIMENTS = settings.experiments()
 CROSS_VALIDATED = {
     **{model.name: model.model_dump(mode="json") for model in settings.crossed_models()},

@@ -50,6 +50,7 @@ rule report:
         towers=every_prediction("geojson"),
         summaries=every_prediction("summary"),
         pages=every_prediction("page"),
+        reviews=every("review", "record"),
         lines=[
             file
             for name in line_tables()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 
 import pandas as pd
@@ -68,6 +68,7 @@ def predictions(context: ReportContext) -> Section | None:
             for name, label, how in SUMMARY_FACTS
             if (value := getattr(found.summary, name)) is not None
         ]
+        facts += _reviewed(context.results.review_counts(survey))
         blocks += [Heading(survey), Facts(facts)]
         address = context.address(found.page)
         if address is not None:
@@ -83,6 +84,15 @@ def predictions(context: ReportContext) -> Section | None:
         "are in the CRS of the survey; the GeoPackage of each survey opens in any GIS."
     )
     return Section("predictions", "Classified surveys", [note, *blocks])
+
+
+def _reviewed(counts: Mapping[str, int] | None) -> list[tuple[str, str]]:
+    """What people decided about the towers of a survey; nothing if nobody reviewed it."""
+    if counts is None:
+        return []
+    decided = ("accepted", "rejected", "added", "not_reviewed")
+    said = ", ".join(f"{counts[name]} {name.replace('_', ' ')}" for name in decided)
+    return [("review", said)]
 
 
 def _not_predicted(survey: str, summary: PredictionSummary) -> list[Block]:

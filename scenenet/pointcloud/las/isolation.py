@@ -188,14 +188,16 @@ class _Pipe:
 
     def _wait(self, done: int) -> None:
         """Wait for data, or until the worker counts as hung."""
-        for turn in range(1, PATIENCE + 1):
+        waited = 0.0
+        while waited < PATIENCE * self._stall:
             if self._selector.select(self._stall):
                 self._worked = _seconds_of_work(self._worker.pid)
                 return
+            waited += self._stall
             if _seconds_of_work(self._worker.pid) - self._worked >= self._stall / 2:
                 break
         raise InputError(
-            f"the decoder hung: it sent no point for {turn * self._stall:g} s after "
+            f"the decoder hung: it sent no point for {waited:g} s after "
             f"{_count(done, self._header)}",
             file=self._header.path,
             remedy=REMEDY + ", or set SCENENET_STALL_SECONDS higher for a slow disk",

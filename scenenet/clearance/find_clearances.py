@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,7 @@ from scenenet.clearance.records import (
     SpanClearance,
     SurveyClearances,
 )
+from scenenet.clearance.sags import hung, without_conductor
 from scenenet.clearance.section import BEYOND_M, Area, PointsIn, measure, sections
 from scenenet.clearance.settings import KINDS, WIRE, ClearanceLimits, ClearanceSettings
 from scenenet.clearance.trees import Trees
@@ -28,6 +30,8 @@ from scenenet.line.frame import SpanFrame
 from scenenet.line.records import AS_FLOWN, Conductor, LineSpan, SurveyLine
 from scenenet.pointcloud.class_schemes import ClassScheme
 
+MOST_NAMED = 10
+"""Most spans that a warning names."""
 SAME_TREE_M = 1.0
 """m, planar: two trees of neighbouring spans that are nearer are one."""
 
@@ -50,6 +54,14 @@ def find_clearances(
     Raises:
         InputError: the table of limits has none for the voltage.
     """
+    if unknown := without_conductor(line, settings.sags):
+        listed = ", ".join(map(str, unknown[:MOST_NAMED])) + ", ..." * (len(unknown) > MOST_NAMED)
+        print(
+            f"warning: the table of sags names {len(unknown)} spans of which no conductor was "
+            f"found here: {listed}",
+            file=sys.stderr,
+        )
+    line = hung(line, settings.sags)
     finder = _Finder(line, points, settings, scheme, settings.applied())
     spans = [span for span in line.spans if span.line]
     walked = spans if progress is None else track(spans, progress)
@@ -140,8 +152,13 @@ class _Finder:
             dangers=len(dangers), few_points=sum(bool(place.note) for place in dangers),
             danger_points=sum(place.points for place in dangers), fall_trees=len(falling),
             fall_margin=min((tree.margin for tree in falling), default=None),
-            kinds=self.kinds, limits=self.limits_named, positions=AS_FLOWN,
+            kinds=self.kinds, limits=self.limits_named, positions=self._positions(span),
         )  # fmt: skip
+
+    def _positions(self, span: LineSpan) -> str:
+        """What the positions of the wires of a span are: what was modelled comes first."""
+        said = {w.positions for w in self._line.conductors if w.span_id == span.span_id}
+        return min(said - {AS_FLOWN}, default=AS_FLOWN)
 
     def _others(self, area: Area, span: LineSpan) -> list[Conductor]:
         """Wires of other spans that may be in an area."""
@@ -176,7 +193,7 @@ class _Finder:
             margin=None if limit is None else point.distance - limit, points=points,
             note="few points" if few else "", along=point.along, x=x, y=y, z=z,
             wire_x=float(on[0]), wire_y=float(on[1]), wire_z=float(on[2]), other_span=other_span,
-            kinds=self.kinds,
+            kinds=self.kinds, positions=wire.positions,
         )  # fmt: skip
 
     def _crossing(self, each: Crossing) -> Clearance:
@@ -201,6 +218,7 @@ class _Finder:
                 distance=float(distance[wire[row], row]), margin=float(margin[row]),
                 span_id=own[wire[row]].span_id, conductor_id=own[wire[row]].conductor_id,
                 along=float(near[wire[row]].along[row]), kinds=self.kinds,
+                positions=own[wire[row]].positions,
             )
             for row in np.flatnonzero(margin < self._settings.fall_reserve).tolist()
         ]  # fmt: skip
@@ -214,7 +232,7 @@ class _Finder:
         return ProfileStep(
             span_id=span.span_id, start=number * self._settings.step, kind=kind,
             distance=point.distance, conductor_id=point.conductor.conductor_id, along=along,
-            x=x, y=y, z=z, wire_z=float(on[2]),
+            x=x, y=y, z=z, wire_z=float(on[2]), positions=point.conductor.positions,
         )  # fmt: skip
 
 

@@ -161,6 +161,11 @@ class SurveyClearances:
         """The places closer than the limit."""
         return tuple(place for place in self.places if place.what == "danger")
 
+    @property
+    def positions(self) -> list[str]:
+        """What the positions of the wires are that it was measured from."""
+        return sorted({span.positions for span in self.spans})
+
     def counts(self) -> dict[str, Any]:
         """What was found, in numbers, for a summary."""
         few = sum(bool(place.note) for place in self.dangers)
@@ -174,6 +179,7 @@ class SurveyClearances:
             "nearest_m": nearest,
             "kinds": self.kinds,
             "limits": self.limits,
+            "positions": self.positions,
         }
 
     def to_json(self) -> dict[str, Any]:

@@ -58,6 +58,18 @@ DEFAULT_LIMITS = tuple(
 """Limits that are used if the user names none."""
 
 
+class SpanSag(Settings):
+    """How conductors of a span hang at another temperature than that of the flight."""
+
+    span: int = Field(ge=0, description="number of the span (span_id)")
+    conductor: int | None = Field(
+        None, ge=1, description="number of the wire in its span; null for all but earth wires"
+    )
+    c: float = Field(gt=0, description="m, catenary parameter at that temperature")
+    temperature: float | None = Field(None, description="degrees Celsius; only repeated in results")
+    source: str = Field("", description="where the numbers are from")
+
+
 class ClearanceSettings(Settings):
     """How clearances are measured (docs/guides/clearances.md)."""
 
@@ -66,6 +78,11 @@ class ClearanceSettings(Settings):
     )
     limits: tuple[ClearanceLimits, ...] = Field(
         DEFAULT_LIMITS, min_length=1, description="limits by voltage"
+    )
+    sags: tuple[SpanSag, ...] = Field(
+        (),
+        description="spans whose clearances are those at another temperature: the same attachments "
+        "with another catenary parameter; the others are as flown",
     )
     reach: float = Field(
         40.0, gt=0, le=200, description="m, planar, beside a conductor up to which is measured"

@@ -1,4 +1,4 @@
-"""``scenenet predict`` with ``--voltage`` and ``--limits``."""
+"""``scenenet predict`` with ``--voltage``, ``--limits`` and ``--sags``."""
 
 from __future__ import annotations
 
@@ -36,12 +36,15 @@ def said(done) -> str:
         (("--voltage", "66", "--limits", "limits.csv"), 1, "highest voltage of the table is 30 kV"),
         (("--voltage", "66", "--limits", "none.csv"), 1, "none.csv: cannot be read"),
         (("--voltage", "0"), 2, "--voltage"),
+        (("--sags", "sags.csv"), 2, "or a model of towers and one of target wire"),
+        (("--line", "--sags", "limits.csv"), 1, "limits.csv: has no column span, c"),
     ],
 )
 def test_limits_that_cannot_be_used_stop_the_command(
     call, pole_survey, pole_model, tmp_path, options, code, problem
 ):
     (tmp_path / "limits.csv").write_text(LIMITS)
+    (tmp_path / "sags.csv").write_text("span,c\n1,900\n")
     named = [str(tmp_path / o) if o.endswith(".csv") else o for o in options]
     done = call("predict", pole_survey, "--model", pole_model, "--out", tmp_path / "out", *named)
     assert done.code == code

@@ -14,6 +14,7 @@ import pyogrio
 import pytest
 from fixtures import scenes
 
+from scenenet.clearance.settings import ClearanceSettings, SpanSag
 from scenenet.detection.settings import DetectionSettings
 from scenenet.line.records import AS_FLOWN, FOUND_AGAIN
 from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
@@ -108,6 +109,29 @@ def test_the_summary_counts_the_line_and_says_what_its_positions_are(predicted):
     line = json.loads(predicted.summary.read_text())["line"]
     assert (line["lines"], line["spans"], line["conductors"]) == (1, 3, 3)
     assert line["positions"] == AS_FLOWN
+
+
+def test_a_table_of_sags_changes_clearances_and_the_page_alone(
+    predicted, line, model, wire_finder, tmp_path
+):
+    spans = rows(predicted.line_tables[0])
+    longest = max(spans, key=lambda row: float(row["length"]))
+    sag = SpanSag(span=int(longest["span_id"]), c=200, temperature=80)
+    files = PredictionFiles.of(line, tmp_path, line=True)
+    predict_to_files(
+        line, [model, wire_finder], files, PredictSettings(), LONE_POLES,
+        clearance=ClearanceSettings(sags=(sag,)),
+    )  # fmt: skip
+    for table, before in zip(files.line_tables[:2], predicted.line_tables, strict=False):
+        assert table.read_bytes() == before.read_bytes()
+    was = {row["span_id"]: float(row["ground"]) for row in rows(predicted.line_tables[2])}
+    for row in rows(files.line_tables[2]):
+        modelled = row["span_id"] == longest["span_id"]
+        assert row["positions"].startswith("modelled at 80 degrees C" if modelled else "as flown")
+        lower = was[row["span_id"]] - float(row["ground"])
+        assert lower > 1.0 if modelled else lower == pytest.approx(0)
+    assert "others modelled at 80 degrees C" in files.page.read_text(encoding="utf-8")
+    assert "modelled" not in predicted.page.read_text(encoding="utf-8")
 
 
 def test_the_picture_draws_each_conductor_over_the_points(predicted):

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from scenenet.clearance.limits_file import COLUMNS
+from scenenet.clearance.settings import ClearanceLimits, SpanSag
+from scenenet.clearance.settings_table import columns_of_table
 from scenenet.cli.inputs import Failures
 from scenenet.cli.options import (
     AsJson,
@@ -107,7 +108,15 @@ def command(
         typer.Option(
             metavar="FILE",
             help="With --voltage: limits for clearances (CSV) with the columns "
-            f"{', '.join(COLUMNS)}.  [default: examples, docs/guides/clearances.md]",
+            f"{columns_of_table(ClearanceLimits)}.  [default: examples, docs/guides/clearances.md]",
+        ),
+    ] = None,
+    sags: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Clearances at another temperature: catenary parameters of spans (CSV) with the "
+            f"columns {columns_of_table(SpanSag)}.  [default: as flown]",
         ),
     ] = None,
     copc: Annotated[
@@ -179,7 +188,7 @@ def command(
     system = coordinate_system(crs)
     if copc:
         require_pdal()
-    clearance = _clearance(voltage, limits)
+    clearance = _clearance(voltage, limits, sags)
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
     towers, lines = model == [packaged_model()], False
@@ -193,11 +202,12 @@ def command(
     if named and not lines:
         if line:
             raise typer.BadParameter("needs a model of towers (--model)", param_hint="--line")
-        if voltage is not None:
-            raise typer.BadParameter(
-                "needs --line, or a model of towers and one of target wire (--model, twice)",
-                param_hint="--voltage",
-            )
+        for option, value in (("--voltage", voltage), ("--sags", sags)):
+            if value is not None:
+                raise typer.BadParameter(
+                    "needs --line, or a model of towers and one of target wire (--model, twice)",
+                    param_hint=option,
+                )
     files = {
         given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=lines)
         for given, survey in named.items()
@@ -247,19 +257,22 @@ def _line(summary: dict[str, Any]) -> str:
     return line if summary["towers"] is not None else f"{line}; towers were not looked for"
 
 
-def _clearance(voltage: float | None, limits: Path | None) -> ClearanceSettings:
+def _clearance(voltage: float | None, limits: Path | None, sags: Path | None) -> ClearanceSettings:
     """How clearances are measured.
 
     Raises:
         typer.BadParameter: there are limits, and no voltage.
-        InputError: the limits cannot be used, or have none for the voltage.
+        InputError: the limits or sags cannot be used, or there is no limit for the voltage.
     """
     from scenenet.clearance.limits_file import read_limits
+    from scenenet.clearance.sags import read_sags
     from scenenet.clearance.settings import ClearanceSettings
 
     if limits is not None and voltage is None:
         raise typer.BadParameter("needs --voltage", param_hint="--limits")
-    given = {} if limits is None else {"limits": read_limits(limits)}
+    given: dict[str, Any] = {} if limits is None else {"limits": read_limits(limits)}
+    if sags is not None:
+        given["sags"] = read_sags(sags)
     settings = ClearanceSettings(voltage=voltage, **given)
     settings.applied()  # fail before the work
     return settings

@@ -42,10 +42,17 @@ def not_seen(detection: DetectionSettings) -> list[str]:
     return sentences
 
 
+def positions_said(prediction: SurveyPrediction) -> str:
+    """What the positions of conductors on the page are."""
+    wires = () if prediction.line is None else prediction.line.conductors
+    said = sorted({wire.positions for wire in wires}) or [AS_FLOWN]
+    return f"Conductors are {', others '.join(said)}"
+
+
 def line_not_seen(prediction: SurveyPrediction) -> list[str]:
     """What the spans do not show, as sentences."""
     sentences = [
-        f"Conductors are {AS_FLOWN}.",
+        f"{positions_said(prediction)}.",
         "A wire that the survey has few points of may be missing, and so may what is near it.",
     ]
     found = prediction.clearances

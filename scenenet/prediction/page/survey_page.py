@@ -5,15 +5,15 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from scenenet.clearance.sags import hung
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.files import write_text
-from scenenet.line.records import AS_FLOWN
 from scenenet.pointcloud.units import SYMBOLS
 from scenenet.prediction.page import markup
 from scenenet.prediction.page.budget import PageBudget
@@ -35,6 +35,7 @@ from scenenet.prediction.page.survey_facts import (
     line_not_seen,
     not_seen,
     parameter_table,
+    positions_said,
     warnings,
 )
 from scenenet.prediction.page.thinning import STEP_M
@@ -106,6 +107,7 @@ def write_page(prediction: SurveyPrediction, path: str | Path) -> None:
     Raises:
         OutputError: the page cannot be written.
     """
+    prediction = as_measured(prediction)
     content = PageContent.of(prediction)
     towers = [tower for tower, _ in content.towers]
     spans = [one.span for one in content.spans]
@@ -150,7 +152,7 @@ def survey_page(
         warnings=warnings(prediction, content.budget),
         caveat=caveats,
         shapes=shapes,
-        **_line_parts(content, units),
+        **_line_parts(content, units, positions_said(prediction)),
         headings=tower_headings(planar, vertical),
         rows=tower_rows(content.towers),
         files=file_table(prediction.files),
@@ -162,7 +164,14 @@ def survey_page(
     )  # fmt: skip
 
 
-def _line_parts(content: PageContent, units: LengthUnits) -> dict[str, str]:
+def as_measured(prediction: SurveyPrediction) -> SurveyPrediction:
+    """The prediction with its conductors where its clearances were measured from."""
+    if prediction.line is None or prediction.clearance is None:
+        return prediction
+    return replace(prediction, line=hung(prediction.line, prediction.clearance.sags))
+
+
+def _line_parts(content: PageContent, units: LengthUnits, positions: str) -> dict[str, str]:
     """The parts of the page about spans; empty where it lists none."""
     names = ("tabs", "key", "spans", "skip")
     if not content.spans:
@@ -172,7 +181,7 @@ def _line_parts(content: PageContent, units: LengthUnits) -> dict[str, str]:
         "n_spans": markup.count(len(content.spans)),
         "headings": span_headings(units),
         "rows": span_rows(content.spans, units),
-        "caveat": escape(AS_FLOWN[:1].upper() + AS_FLOWN[1:]),
+        "caveat": escape(positions),
     }
     return {f"line_{name}": _template(f"line_{name}.html").substitute(values) for name in names}
 

@@ -29,7 +29,7 @@ from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme, class_scheme
 from scenenet.pointcloud.targets import WIRE, Target
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from scenenet.clearance.settings import ClearanceSettings
     from scenenet.prediction.settings import PredictSettings
@@ -179,7 +179,6 @@ def command(
     from scenenet.prediction.result_files import PredictionFiles, require_space
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles, look_at
-    from scenenet.prediction.used_models import finds_lines, use_models
 
     settings = PredictSettings(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
@@ -191,23 +190,11 @@ def command(
     clearance = _clearance(voltage, limits, sags)
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
-    towers, lines = model == [packaged_model()], False
-    if named and (line or not towers):  # it loads torch, which takes seconds
-        used = use_models(model, settings, scheme)
-        if line and not any(each.target.name == WIRE for each in used):
-            model = [*model, packaged_model(WIRES)]
-            used = use_models(model, settings, scheme)
-        _require_codes(used, settings, scheme)
-        towers, lines = used[0].target.is_tower, finds_lines(used)
+    towers, lines = True, line
+    if named and (line or model != [packaged_model()]):  # it loads torch, which takes seconds
+        model, towers, lines = _chosen(model, line, settings, scheme)
     if named and not lines:
-        if line:
-            raise typer.BadParameter("needs a model of towers (--model)", param_hint="--line")
-        for option, value in (("--voltage", voltage), ("--sags", sags)):
-            if value is not None:
-                raise typer.BadParameter(
-                    "needs --line, or a model of towers and one of target wire (--model, twice)",
-                    param_hint=option,
-                )
+        _refuse_without_lines({"--line": line, "--voltage": voltage, "--sags": sags})
     files = {
         given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=lines)
         for given, survey in named.items()
@@ -276,6 +263,37 @@ def _clearance(voltage: float | None, limits: Path | None, sags: Path | None) ->
     settings = ClearanceSettings(voltage=voltage, **given)
     settings.applied()  # fail before the work
     return settings
+
+
+def _chosen(
+    models: list[Path], line: bool, settings: PredictSettings, scheme: ClassScheme | None
+) -> tuple[list[Path], bool, bool]:
+    """The models that predict, with that of wires that ``--line`` asks for; whether they find
+    towers, and whether lines follow from what they find."""
+    from scenenet.prediction.used_models import finds_lines, use_models
+
+    used = use_models(models, settings, scheme)
+    if line and not any(each.target.name == WIRE for each in used):
+        models = [*models, packaged_model(WIRES)]
+        used = use_models(models, settings, scheme)
+    _require_codes(used, settings, scheme)
+    return models, used[0].target.is_tower, finds_lines(used)
+
+
+def _refuse_without_lines(options: Mapping[str, object]) -> None:
+    """Refuse the options that need lines where no line is looked for.
+
+    Raises:
+        typer.BadParameter: one is given.
+    """
+    for option, value in options.items():
+        if value:
+            needed = (
+                "a model of towers (--model)"
+                if option == "--line"
+                else "--line, or a model of towers and one of target wire (--model, twice)"
+            )
+            raise typer.BadParameter(f"needs {needed}", param_hint=option)
 
 
 def _require_codes(

@@ -19,7 +19,12 @@ from scenenet.pointcloud.cloud import PointCloud
 from scenenet.synthetic.annotation_noise import annotate
 from scenenet.synthetic.codes import TOWER
 from scenenet.synthetic.returns.clutter import clutter_points
-from scenenet.synthetic.returns.conductors import conductor_points, middles, other_cables
+from scenenet.synthetic.returns.conductors import (
+    conductor_points,
+    jumper_points,
+    middles,
+    other_cables,
+)
 from scenenet.synthetic.returns.flight import Flight, flight_of
 from scenenet.synthetic.returns.scan import Scanner
 from scenenet.synthetic.returns.stray_returns import stray_points
@@ -97,11 +102,10 @@ class Corridor:
         settings, found = self.settings, []
         n_conductors = 3 * settings.circuits
         for number in range(len(self)):
-            supports = self.line.support(number), self.line.support(number + 1)
+            before, after = self.line.support(number), self.line.support(number + 1)
             ends = (
-                middles(tower.attachments, tower.azimuth, settings.bundle, n_conductors)
-                + self._origin
-                for tower in supports
+                middles(held, tower.azimuth, settings.bundle, n_conductors) + self._origin
+                for tower, held in ((before, before.ahead), (after, after.behind))
             )
             for number_at, (start, end) in enumerate(zip(*ends, strict=True)):
                 is_earth = number_at >= n_conductors
@@ -174,6 +178,8 @@ class Corridor:
             parts += self._strip_points(index, number, strip, before, after, flight, rng)
         if index < settings.towers:
             parts.append(self._tower_points(after, flight, rng))
+            if after.tension:
+                parts.append(jumper_points(after, flight, settings, rng))
         xyz = np.concatenate([points for points, _ in parts])
         truth = np.concatenate([codes for _, codes in parts])
         ends = [(index, before), (index + 1, after)]

@@ -91,6 +91,11 @@ class SyntheticSettings(Settings):
     bend_share: Share = Field(
         0.2, description="share of the towers at which the line changes direction"
     )
+    tension: Share = Field(
+        0.0,
+        description="share of the towers on straight stretches that end their conductors at tension"
+        " strings, with jumpers around the tower; with a share above 0 all towers at bends do",
+    )
     other_lines: float = Field(
         14.0,
         ge=0.0,

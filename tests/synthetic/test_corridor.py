@@ -169,11 +169,11 @@ def test_conductors_run_from_tower_to_tower_above_the_ground(small):
         conductors = stretch.xyz[stretch.truth == CONDUCTOR]
         conductors = conductors - [corridor.settings.easting, corridor.settings.northing, 0]
         for support in (before, after):
-            for held in support.attachments:
+            for held in support.ahead:
                 assert np.linalg.norm(conductors - held, axis=1).min() < 3.0
         ground = corridor.terrain.height(conductors[:, 0], conductors[:, 1])
         assert (conductors[:, 2] - ground).min() > 4
-        highest = max(before.attachments[:, 2].max(), after.attachments[:, 2].max())
+        highest = max(before.ahead[:, 2].max(), after.behind[:, 2].max())
         assert conductors[:, 2].max() < highest + 0.1
 
 

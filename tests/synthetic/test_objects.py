@@ -91,8 +91,8 @@ def test_cables_of_other_lines_are_tall_and_not_main_line(bare):
 def test_conductors_bundles_and_earth_wires(bare, circuits, bundle, earth_wires):
     settings = bare(circuits=circuits, bundle=bundle, earth_wires=earth_wires, towers=2)
     tower = make_corridor(settings).line.support(1)
-    assert len(tower.attachments) == 3 * circuits + earth_wires
-    cables = bundled(tower.attachments, tower.azimuth, bundle, 3 * circuits)
+    assert len(tower.ahead) == 3 * circuits + earth_wires
+    cables = bundled(tower.ahead, tower.azimuth, bundle, 3 * circuits)
     assert len(cables) == 3 * circuits * bundle + earth_wires
     gap = np.linalg.norm(cables[:, None] - cables, axis=2) + 9 * np.eye(len(cables))
     if bundle > 1:

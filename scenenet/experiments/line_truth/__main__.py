@@ -41,7 +41,13 @@ SETTINGS: Mapping[str, Mapping[str, Any]] = {"lattice": PYLONS, "window": PYLONS
 
 
 def run(
-    kind: str, towers: int, seed: int, wires: Path, voltage: float, folder: Path
+    kind: str,
+    towers: int,
+    seed: int,
+    wires: Path,
+    voltage: float,
+    folder: Path,
+    tension: float = 0.0,
 ) -> tuple[conductors.Comparison, clearances.Comparison]:
     """Make the survey of a kind of tower, predict it, and compare.
 
@@ -49,7 +55,7 @@ def run(
         InputError: the model cannot be used, or there are no limits for the voltage.
     """
     own = {**SETTINGS.get(kind, POLES), "kinds": {kind: 1.0}, "section": 0, "margin": 30.0}
-    settings = SyntheticSettings(**own, towers=towers, seed=seed)
+    settings = SyntheticSettings(**own, towers=towers, seed=seed, tension=tension)
     survey, truth = folder / f"{kind}.laz", folder / f"{kind}.truth.laz"
     make_survey(settings, survey, truth, progress=f"{kind}: survey made")
     limits = ClearanceSettings(voltage=voltage)
@@ -80,12 +86,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--towers", type=int, default=24, help="towers of a line (default 24)")
     parser.add_argument("--seed", type=int, default=5, help="of the surveys (default 5)")
     parser.add_argument("--voltage", type=float, default=66, help="kV, of the limits (default 66)")
+    parser.add_argument(
+        "--tension",
+        type=float,
+        default=0.0,
+        help="share of towers on straight stretches that end their conductors; bends do then too "
+        "(default 0)",
+    )
     parser.add_argument("--kinds", nargs="+", choices=get_args(Kind), default=get_args(Kind))
     chosen = parser.parse_args(arguments)
     try:
         with scratch_folder() as folder:
             found = [
-                run(kind, chosen.towers, chosen.seed, chosen.model, chosen.voltage, folder)
+                run(
+                    kind,
+                    chosen.towers,
+                    chosen.seed,
+                    chosen.model,
+                    chosen.voltage,
+                    folder,
+                    chosen.tension,
+                )
                 for kind in chosen.kinds
             ]
     except InputError as error:

@@ -10,6 +10,7 @@ from scenenet.synthetic.returns.flight import Flight
 from scenenet.synthetic.scene.line import Support
 from scenenet.synthetic.scene.random_fields import Raster
 from scenenet.synthetic.scene.strip import Strip
+from scenenet.synthetic.scene.tension import ASIDE_M, jumper
 from scenenet.synthetic.settings import SyntheticSettings
 
 BUNDLE_M = 0.4
@@ -88,10 +89,8 @@ def conductor_points(
     """Points (N, 3) and class codes (N,) of the conductors and earth wires of the line in a
     strip."""
     conductors = 3 * settings.circuits
-    starts, ends = (
-        bundled(tower.attachments, tower.azimuth, settings.bundle, conductors)
-        for tower in (before, after)
-    )
+    starts = bundled(before.ahead, before.azimuth, settings.bundle, conductors)
+    ends = bundled(after.behind, after.azimuth, settings.bundle, conductors)
     window = (strip.low / span, strip.high / span)
     points = string_conductors(
         starts,
@@ -102,6 +101,32 @@ def conductor_points(
         rng,
         window,
     )
+    points += 0.7 * settings.ranging_noise * rng.standard_normal(points.shape)
+    return points, np.full(len(points), CONDUCTOR, np.uint8)
+
+
+def jumper_points(
+    tower: Support, flight: Flight, settings: SyntheticSettings, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (N, 3) and class codes (N,) of the jumpers of a tension tower."""
+    conductors = 3 * settings.circuits
+    behind, ahead = (
+        bundled(ends[:conductors], tower.azimuth, settings.bundle, conductors)
+        for ends in (tower.behind, tower.ahead)
+    )
+    step = flight.line_step / flight.on_line
+    parts = []
+    for start, end in zip(behind, ahead, strict=True):
+        middle = (start + end)[:2] / 2
+        in_the_way = np.hypot(*(middle - (tower.x, tower.y))) < ASIDE_M
+        curve = jumper(start, end, bool(in_the_way))
+        # Scan lines cross the loop at steps of its length, not of its plan.
+        hung = curve.at_shares(np.linspace(0, 1, 50))
+        along = np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(hung, axis=0), axis=1))]
+        at = np.arange(rng.uniform(0, step), along[-1], step)
+        at = at[rng.random(len(at)) < flight.conductors]
+        parts.append(curve.at_shares(np.interp(at, along, np.linspace(0, 1, 50))))
+    points = np.concatenate(parts)
     points += 0.7 * settings.ranging_noise * rng.standard_normal(points.shape)
     return points, np.full(len(points), CONDUCTOR, np.uint8)
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from scenenet.synthetic.scene.random_fields import stream
 from scenenet.synthetic.scene.strip import Strip
+from scenenet.synthetic.scene.tension import strung
 from scenenet.synthetic.scene.terrain import Terrain
 from scenenet.synthetic.scene.towers import KINDS, Size, Structure, place
 from scenenet.synthetic.settings import SHORTEST_SHARE, SyntheticSettings
 
-LINE, STRETCH, TOWER, FLIGHT, FOOT = 0, 1, 2, 3, 4
+LINE, STRETCH, TOWER, FLIGHT, FOOT, TENSION = 0, 1, 2, 3, 4, 5
 """First number of the key of a random stream: its purpose."""
 
 CLEARANCE_M = 5.0
@@ -33,7 +34,9 @@ class Support:
         kind: see ``towers.KINDS``.
         azimuth: direction of the line at the tower (bisector at a bend), radians from east.
         structure: its members, in the frame of the tower.
-        attachments: (W, 3) where its conductors and earth wires are attached.
+        behind, ahead: (W, 3) where the conductors and earth wires of the span behind and of the
+            span ahead are attached; the same places where it only carries them.
+        tension: whether it ends its conductors (``tension``).
     """
 
     x: float
@@ -43,7 +46,9 @@ class Support:
     kind: str
     azimuth: float
     structure: Structure
-    attachments: np.ndarray
+    behind: np.ndarray
+    ahead: np.ndarray
+    tension: bool
 
 
 class Line:
@@ -96,8 +101,23 @@ class Line:
         x, y = map(float, nodes[k])
         size = Size(settings.body_width, settings.arm_reach)
         structure = KINDS[kinds[k]](height, settings.circuits, settings.earth_wires, size)
-        attachments = place(structure.attachments, x, y, base, azimuth)
-        return Support(x, y, base, height, str(kinds[k]), azimuth, structure, attachments)
+        behind = ahead = structure.attachments
+        tension = self._is_tension(k)
+        if tension:
+            made = strung(structure, float(np.arctan(self._half_turns[k])))
+            structure, behind, ahead = made.structure, made.behind, made.ahead
+        behind, ahead = (place(ends, x, y, base, azimuth) for ends in (behind, ahead))
+        return Support(
+            x, y, base, height, str(kinds[k]), azimuth, structure, behind, ahead, tension
+        )
+
+    def _is_tension(self, k: int) -> bool:
+        """Whether support ``k`` ends its conductors: at every bend, and at some other towers."""
+        settings = self._settings
+        if settings.tension == 0:
+            return False
+        drawn = stream(settings.seed, TENSION, k).random() < settings.tension
+        return bool(drawn or self._half_turns[k] != 0)
 
     def _beyond(self) -> float:
         """Length of the ends of gaps that belong to the supports outside the corridor, m."""

@@ -33,11 +33,14 @@ class Structure:
         attachments: (W, 3), m: where wires are attached. The conductors of a circuit from left to
             right (two circuits: left side upwards, then right side), then the earth wires.
         half_base: half the side of the foot, m.
+        insulators: rows of the members that are insulators, one for each conductor in the order of
+            the attachments: from the tower to the attachment.
     """
 
     members: np.ndarray
     attachments: np.ndarray
     half_base: float
+    insulators: tuple[int, ...]
 
 
 class Size(NamedTuple):
@@ -66,12 +69,19 @@ class _Frame:
 
     def __init__(self) -> None:
         self._rows: list[tuple[float, ...]] = []
+        self._insulators: list[int] = []
 
     def bar(self, a: tuple, b: tuple, radius: float, end_radius: float | None = None) -> None:
         self._rows.append((*a, *b, radius, radius if end_radius is None else end_radius))
 
-    def array(self) -> np.ndarray:
-        return np.asarray(self._rows, dtype=np.float64)
+    def insulator(self, a: tuple, b: tuple, radius: float) -> None:
+        self._insulators.append(len(self._rows))
+        self.bar(a, b, radius)
+
+    def structure(self, attachments: list[tuple], half_base: float) -> Structure:
+        """The tower of the members."""
+        members = np.asarray(self._rows, dtype=np.float64)
+        return Structure(members, np.asarray(attachments), half_base, tuple(self._insulators))
 
 
 def _lattice_body(
@@ -109,7 +119,7 @@ def _hang(
     """Insulator strings below ``points``; returns their lower ends."""
     ends = [(x, y, z - length) for x, y, z in points]
     for point, end in zip(points, ends, strict=True):
-        frame.bar(point, end, 0.07)
+        frame.insulator(point, end, 0.07)
     return ends
 
 
@@ -139,7 +149,7 @@ def _pole_head(
             frame.bar((-reach, 0, z), (reach, 0, z), 0.07)
         ends = [(side * reach, 0.0, z) for side in (-1, 1) for z in storeys]
     for x, y, z in ends:
-        frame.bar((x, y, z), (x, y, z + pin), 0.06)
+        frame.insulator((x, y, z), (x, y, z + pin), 0.06)
     points = [(x, y, z + pin) for x, y, z in ends]
     return points + _earth(frame, height, earth_wires)
 
@@ -176,7 +186,7 @@ def lattice(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_
         tips.append((reach * scale, 0.0, z))
     points = _hang(frame, tips, min(2.0, 0.045 * height))
     points += _earth(frame, height, earth_wires)
-    return Structure(frame.array(), np.asarray(points), base)
+    return frame.structure(points, base)
 
 
 def lattice_pole(
@@ -191,7 +201,7 @@ def lattice_pole(
         frame, np.r_[-BELOW_GROUND_M, levels], np.r_[halves[0], halves], leg=0.035, brace=0.012
     )
     points = _pole_head(frame, height, circuits, earth_wires, size.reach_or(1.02), drop=1.62)
-    return Structure(frame.array(), np.asarray(points), foot)
+    return frame.structure(points, foot)
 
 
 def tubular(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
@@ -200,7 +210,7 @@ def tubular(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_
     foot, top = (0.013 * height, 0.12) if size.width is None else (size.width / 2, size.width / 2)
     frame.bar((0, 0, -BELOW_GROUND_M), (0, 0, height), foot, top)
     points = _pole_head(frame, height, circuits, earth_wires, size.reach_or(0.98), drop=1.62)
-    return Structure(frame.array(), np.asarray(points), max(0.3, top))
+    return frame.structure(points, max(0.3, top))
 
 
 def wooden(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
@@ -213,7 +223,7 @@ def wooden(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_K
     arm = points[0][2] - 0.2
     for side in (-1, 1):
         frame.bar((0, 0, arm - 0.9), (side * min(0.9, reach), 0, arm), 0.05)
-    return Structure(frame.array(), np.asarray(points), max(0.2, top))
+    return frame.structure(points, max(0.2, top))
 
 
 def h_frame(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
@@ -228,7 +238,7 @@ def h_frame(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_
     shares = (-1.0, 0.0, 1.0) if circuits == 1 else (-1.0, -0.65, -0.3, 0.3, 0.65, 1.0)
     points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.6)
     points += [(side * half, 0.0, height) for side in (1, -1)[:earth_wires]]
-    return Structure(frame.array(), np.asarray(points), half)
+    return frame.structure(points, half)
 
 
 def window(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_KIND) -> Structure:
@@ -256,7 +266,7 @@ def window(height: float, circuits: int, earth_wires: int, size: Size = OF_ITS_K
     shares = (-1.0, 0.0, 1.0) if circuits == 1 else (-1.0, -0.75, -0.2, 0.2, 0.75, 1.0)
     points = _hang(frame, [(share * reach, 0.0, beam) for share in shares], 0.08 * height)
     points += [(side * apart, 0.0, height) for side in (1, -1)[:earth_wires]]
-    return Structure(frame.array(), np.asarray(points), base)
+    return frame.structure(points, base)
 
 
 def _leg(frame: _Frame, middles: np.ndarray, z: np.ndarray, half: float) -> None:

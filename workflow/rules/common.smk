@@ -118,6 +118,16 @@ def content_of(path):
         return "unreadable"  # its own jobs fail and say why, and no other
 
 
+def tower_list(survey):
+    """What ``scenenet.review`` reads of a prediction: the list, and what stands beside it."""
+    folder = f"{R}/predict/{survey}/{survey}"
+    return {
+        "table": f"{folder}.towers.csv",
+        "summary": f"{folder}.summary.json",
+        "geopackage": f"{folder}.gpkg",
+    }
+
+
 def truth_of(survey):
     """The file with the true classes of a survey, in a list; an empty one for a recorded survey."""
     path = Path(SURVEYS[survey].path)

@@ -1,16 +1,6 @@
 """What people decide about the towers of new surveys: a list to fill in, and the reviewed towers."""
 
 
-def tower_list(survey):
-    """What ``scenenet.review`` reads of a prediction: the list, and what stands beside it."""
-    folder = f"{R}/predict/{survey}/{survey}"
-    return {
-        "table": f"{folder}.towers.csv",
-        "summary": f"{folder}.summary.json",
-        "geopackage": f"{folder}.gpkg",
-    }
-
-
 rule review_template:
     input:
         **tower_list("{survey}"),

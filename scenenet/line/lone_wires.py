@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -46,10 +47,14 @@ def lone_spans(
     found: list[TracedSpan] = []
     left = free & points.certain
     while True:
-        frame = _straightest(points.xyz, left)
-        if frame is None:
+        stretch = _straightest(points.xyz, left)
+        if stretch is None:
             return _joined(found)
-        frame = _cut(frame, towers)
+        parts = _parts(stretch, towers)
+        frame = next((p for p in parts if left[points.beside(p, LOOKED_AT_M)].any()), None)
+        if frame is None:  # the points lie at its ends
+            left[points.beside(stretch, LOOKED_AT_M, beyond=LOOKED_AT_M)] = False
+            continue
         rows = points.beside(frame, REACH_M, beyond=PAST_M)
         rows = rows[free[rows] & points.certain[rows]]
         wires = [
@@ -122,17 +127,18 @@ def _axis(places: np.ndarray) -> SpanFrame | None:
     return SpanFrame(float(start[0]), float(start[1]), direction, float(high - low))
 
 
-def _cut(frame: SpanFrame, towers: Sequence[LineTower]) -> SpanFrame:
-    """The longest part of a stretch between towers: wires bend there."""
+def _parts(frame: SpanFrame, towers: Sequence[LineTower]) -> list[SpanFrame]:
+    """The parts of a stretch between towers, where wires bend; the longest first."""
     cuts = [0.0, frame.length]
     for tower in towers:
         s, t = frame.to_frame(np.array([[tower.x, tower.y, 0.0]]))[0, :2].tolist()
         if PAST_M < s < frame.length - PAST_M and abs(t) <= REACH_M / 2:
             cuts.append(s)
-    cuts.sort()
-    first = int(np.argmax(np.diff(cuts)))
-    x, y, _ = frame.to_map(np.array([[cuts[first], 0.0, 0.0]]))[0].tolist()
-    return SpanFrame(x, y, frame.direction, cuts[first + 1] - cuts[first])
+    parts = []
+    for low, high in pairwise(sorted(cuts)):
+        x, y, _ = frame.to_map(np.array([[low, 0.0, 0.0]]))[0].tolist()
+        parts.append(SpanFrame(x, y, frame.direction, high - low))
+    return sorted(parts, key=lambda part: -part.length)
 
 
 def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[TracedSpan]:

@@ -134,7 +134,8 @@ class LineNote(Record):
     x: float = column("m", "easting", heading="x")
     y: float = column("m", "northing", heading="y")
     what: str = column(
-        "", "tower expected; tower without a conductor; or tower found where the line expected one",
+        "", "tower expected; tower without a conductor; tower found where the line expected one; "
+        "or tower dropped, which conductors pass without a bend",
         heading="what",
     )  # fmt: skip
     tower: int = column("", "id of the tower there, 0 for none", heading="tower")
@@ -169,6 +170,7 @@ class Support(Record):
 
 EXPECTED, UNHELD = "tower expected", "tower without a conductor"
 FOUND_AGAIN = "tower found where the line expected one"
+PASSED = "tower dropped: conductors pass it without a bend"
 """What the line says of a place."""
 
 CONDUCTOR_COLUMNS = columns_of(Conductor)

@@ -3,7 +3,7 @@ the towers that they ask for."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,7 +13,7 @@ from scenenet.detection.survey_tower import SurveyTower
 from scenenet.line.find_line import find_line
 from scenenet.line.hung import REACH_M, LineTower
 from scenenet.line.passed import passed_towers
-from scenenet.line.records import EXPECTED, FOUND_AGAIN, UNHELD, LineNote, SurveyLine
+from scenenet.line.records import EXPECTED, FOUND_AGAIN, PASSED, UNHELD, LineNote, SurveyLine
 from scenenet.line.wire_points import WirePoints
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_near
 from scenenet.prediction.surroundings import occupied_voxels
@@ -72,7 +72,8 @@ def find_line_in_survey(
     """Find the lines of a survey, and the towers that they ask for.
 
     Where wires end in the air amid the survey, a tower is expected and looked for once more. It is
-    kept if the line then leads to it. Towers that conductors pass without a bend are dropped.
+    kept if the line then leads to it. Towers that conductors pass without a bend are dropped, and
+    listed as places to look at.
 
     Args:
         wires, towers: what conductors and towers are looked for in.
@@ -81,6 +82,7 @@ def find_line_in_survey(
     """
     points = _wire_points(wires, towers.spool)
     seen = occupied_voxels(towers.spool)
+    dropped: set[int] = set()
 
     def between(own: FoundTowers) -> FoundLine:
         """The line between towers, less those that it passes: without them it runs on."""
@@ -90,12 +92,13 @@ def find_line_in_survey(
             passed = passed_towers(known, line.conductors)
             if not passed:
                 return FoundLine(line, own)
+            dropped.update(passed)
             own = own.without(passed)
 
     first = between(found)
     more = _with_expected(first.line, towers, first.towers)
     if more is first.towers:
-        return first
+        return _noted(first, _dropped_notes(found.towers, dropped, towers.unit_sizes))
     asked = between(more)
     places = {(tower.x, tower.y) for tower in first.towers.towers}
 
@@ -106,11 +109,25 @@ def find_line_in_survey(
     if idle:
         asked = between(asked.towers.without(idle))
     planar = towers.unit_sizes[0]
-    notes = (
+    notes = [
         LineNote(tower.x * planar, tower.y * planar, FOUND_AGAIN, number, 0)
         for number, tower in again().items()
-    )
-    return replace(asked, line=replace(asked.line, notes=(*asked.line.notes, *notes)))
+    ]
+    return _noted(asked, [*notes, *_dropped_notes(found.towers, dropped, towers.unit_sizes)])
+
+
+def _noted(found: FoundLine, notes: Sequence[LineNote]) -> FoundLine:
+    """The same with more places to look at."""
+    return replace(found, line=replace(found.line, notes=(*found.line.notes, *notes)))
+
+
+def _dropped_notes(
+    towers: Sequence[SurveyTower], dropped: Set[int], unit_sizes: tuple[float, float, float]
+) -> list[LineNote]:
+    """The places of the towers of a list that were dropped; they have no id any more."""
+    planar = unit_sizes[0]
+    gone = (tower for tower in towers if tower.id in dropped)
+    return [LineNote(tower.x * planar, tower.y * planar, PASSED, 0, 0) for tower in gone]
 
 
 def _with_expected(line: SurveyLine, towers: TowerSearch, found: FoundTowers) -> FoundTowers:

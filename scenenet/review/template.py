@@ -9,7 +9,7 @@ from typing import Any
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic
-from scenenet.line.records import EXPECTED, LineNote
+from scenenet.line.records import EXPECTED, PASSED, LineNote
 from scenenet.prediction.tower_lists import arrays, write_layer
 from scenenet.review.decisions import LAYER
 from scenenet.review.doubts import Doubted, by_doubt
@@ -40,7 +40,8 @@ def write_template(path: Path, found: FoundList) -> list[Doubted]:
     if path.suffix.lower() not in (".csv", ".gpkg"):
         raise InputError("a review file is a .csv or .gpkg file", file=path)
     doubted = by_doubt(found)
-    rows = [*map(_expected, expected(found)), *map(_row, doubted)]
+    places = [note for note in found.notes if note.what in WITHOUT_TOWER]
+    rows = [*map(_of_place, places), *map(_row, doubted)]
     with atomic(path) as partial:
         if path.suffix.lower() == ".csv":
             with partial.open("w", encoding="utf-8", newline="") as stream:
@@ -54,15 +55,16 @@ def write_template(path: Path, found: FoundList) -> list[Doubted]:
     return doubted
 
 
-def expected(found: FoundList) -> list[LineNote]:
-    """The places where the line between the towers expects one more."""
-    return [note for note in found.notes if note.what == EXPECTED]
+WITHOUT_TOWER = {
+    EXPECTED: "conductors end here: a tower is expected",
+    PASSED: "a tower was dropped here: conductors pass without a bend",
+}
+"""What the line says of places that have no tower of the list -> why to look there."""
 
 
-def _expected(note: LineNote) -> dict[str, Any]:
+def _of_place(note: LineNote) -> dict[str, Any]:
     """A row without an id; a person who sees a tower there writes ``add``."""
-    why = "conductors end here: a tower is expected"
-    return {**dict.fromkeys(COLUMNS), "doubts": why, "x": note.x, "y": note.y}
+    return {**dict.fromkeys(COLUMNS), "doubts": WITHOUT_TOWER[note.what], "x": note.x, "y": note.y}
 
 
 def _row(doubted: Doubted) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import laspy
@@ -16,7 +17,7 @@ from fixtures import scenes
 
 from scenenet.clearance.settings import ClearanceSettings, SpanSag
 from scenenet.detection.settings import DetectionSettings
-from scenenet.line.records import AS_FLOWN, FOUND_AGAIN
+from scenenet.line.records import AS_FLOWN, FOUND_AGAIN, PASSED
 from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import TowerSearch, find_in_survey
 from scenenet.prediction.predict import predict_survey
@@ -81,6 +82,26 @@ def test_a_tower_that_was_missed_is_found_where_the_line_expects_it(line, model,
     spans = {(span.from_tower, span.to_tower) for span in again.line.spans}
     assert spans == {(span.from_tower, span.to_tower) for span in whole.line.spans}
     assert FoundLine.from_json(again.to_json()).towers.towers == again.towers.towers
+
+
+def test_a_tree_that_was_taken_for_a_tower_is_dropped_and_its_place_listed(
+    line, model, wire_finder
+):
+    with predict_survey(line, [model, wire_finder], PredictSettings(), LONE_POLES) as whole:
+        [wires] = whole.further
+        search = WireSearch(wires.spool, wires.tiles, wires.used.card.threshold())
+        tau = whole.card.threshold()
+        towers = TowerSearch(whole.spool, whole.tiles, whole.unit_sizes, tau, LONE_POLES)
+        found = find_in_survey(towers)
+        first, second, _ = sorted(found.towers, key=lambda tower: tower.x)
+        middle = (first.x + second.x) / 2, (first.y + second.y) / 2
+        tree = replace(first, id=7, x=middle[0], y=middle[1], width=3.0)
+        again = find_line_in_survey(search, towers, replace(found, towers=(*found.towers, tree)))
+    assert {tower.id for tower in again.towers.towers} == {tower.id for tower in found.towers}
+    notes = [note for note in again.line.notes if note.what == PASSED]
+    assert [(note.x, note.y, note.tower) for note in notes] == [(*middle, 0)]
+    spans = {(span.from_tower, span.to_tower) for span in again.line.spans}
+    assert spans == {(span.from_tower, span.to_tower) for span in whole.line.spans}
 
 
 def test_each_point_of_the_wire_has_its_span_and_no_other_point_has_one(predicted, line):

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from scenenet.clearance.records import SurveyClearances
-from scenenet.line.records import EXPECTED, FOUND_AGAIN, UNHELD, Conductor, SurveyLine
+from scenenet.line.records import EXPECTED, FOUND_AGAIN, PASSED, UNHELD, Conductor, SurveyLine
 from scenenet.prediction.page.budget import MOST_MARKS
 from scenenet.prediction.page.frame import MapFrame
 from scenenet.prediction.page.span_facts import SpanFacts
@@ -61,6 +61,7 @@ def line_shapes(
         ("expected", [(n.x, n.y) for n in line.notes if n.what == EXPECTED]),
         ("again", [(n.x, n.y) for n in line.notes if n.what == FOUND_AGAIN]),
         ("unheld", [(n.x, n.y) for n in line.notes if n.what == UNHELD]),
+        ("passed", [(n.x, n.y) for n in line.notes if n.what == PASSED]),
     ):
         shapes += _marks(name, places, frame, planar)
     return shapes

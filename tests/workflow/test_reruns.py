@@ -11,9 +11,10 @@ import pytest
 
 pytestmark = pytest.mark.workflow
 
-REVIEWED = {"review": 1, "report": 1}
-PREDICTED = {"predict": 1, "prediction_map": 1, "review_template": 1, **REVIEWED}
-"""Jobs after a change of the best model; there is one survey to classify."""
+CLASSIFIED = {"predict": 1, "prediction_map": 1, "review_template": 1, "report": 1}
+"""Jobs of a survey to classify that nobody has reviewed."""
+PREDICTED = {**CLASSIFIED, "review": 1}
+"""Jobs after a change of the best model; there is one survey to classify, which was reviewed."""
 
 SHOWN = {"figures": 1, "track": 1, "register": 1, "interactive_crop": 3}
 """Jobs that show the scores of models, besides the tables and the report."""
@@ -83,14 +84,14 @@ MISSING = re.compile(r"Missing output files: ([^;\n]+)")
 def test_a_new_survey_in_the_sheet_runs_its_own_jobs_and_the_report(project):
     shutil.copy(project.folder / "data/own.laz", project.folder / "data/another.laz")
     project.add_row("another", "data/another.laz", "edp", "new")
-    assert project.planned() == {"check": 1, **PREDICTED}
+    assert project.planned() == {"check": 1, **CLASSIFIED}
 
 
 def test_a_file_put_into_the_inbox_runs_its_own_jobs_and_the_report(project):
     inbox = project.folder / "surveys"
     inbox.mkdir()
     shutil.copy(project.folder / "data/own.laz", inbox / "Line 7.laz")
-    assert project.planned() == {"check": 1, **PREDICTED}
+    assert project.planned() == {"check": 1, **CLASSIFIED}
     assert "Classifying Line_7" in project.run("-n")
 
 
@@ -113,7 +114,7 @@ def test_replacing_a_survey_by_an_older_file_runs_its_jobs(project):
     other.write_bytes(survey.read_bytes() + b"\0")
     os.utime(other, (1_000_000_000, 1_000_000_000))
     shutil.copy2(other, survey)  # as cp -p and rsync -a do
-    assert project.planned() == {"check": 1, **PREDICTED}
+    assert project.planned() == {"check": 1, **CLASSIFIED}
 
 
 def test_naming_other_class_codes_runs_the_jobs_that_read_them(project):

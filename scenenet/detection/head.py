@@ -109,9 +109,9 @@ def find_head(
 
     Args:
         s, t, h: (N,) m, points in the frame of the tower: along the line, to its right, up.
+            Points lower than ``FORK`` of the height may be left out.
         profile: the body.
         apart: m, half the distance between the bodies of a portal.
-            Lower points than ``FORK`` of the height may be left out.
         low, high: m above the ground, of the lowest crossarm and the highest conductor.
         reach: m, of the outermost conductor.
     """

@@ -61,7 +61,6 @@ def find_clearances(
             f"found here: {listed}",
             file=sys.stderr,
         )
-    line = hung(line, settings.sags)
     finder = _Finder(line, points, settings, scheme, settings.applied())
     spans = [span for span in line.spans if span.line]
     walked = spans if progress is None else track(spans, progress)
@@ -98,7 +97,8 @@ class _Finder:
         scheme: ClassScheme | None,
         limits: ClearanceLimits | None,
     ) -> None:
-        self._line, self._points, self._settings = line, points, settings
+        self._flown, self._line = line, hung(line, settings.sags)
+        self._points, self._settings = points, settings
         self._scheme, self._limits = scheme, limits
         self.kinds = kinds_from(scheme)
         self.limits_named = "" if limits is None else f"{settings.voltage:g} kV: {limits.source}"
@@ -112,7 +112,7 @@ class _Finder:
         frame = SpanFrame.between(np.array(span.start), np.array(span.end))
         measured = [
             measure(
-                area, own, self._others(area, span), self._points, self._scheme, self._limits,
+                area, own, self._flown_near(area), self._points, self._scheme, self._limits,
                 self._settings,
             )
             for area in sections(frame, own, self._settings.reach)
@@ -160,13 +160,12 @@ class _Finder:
         said = {w.positions for w in self._line.conductors if w.span_id == span.span_id}
         return min(said - {AS_FLOWN}, default=AS_FLOWN)
 
-    def _others(self, area: Area, span: LineSpan) -> list[Conductor]:
-        """Wires of other spans that may be in an area."""
+    def _flown_near(self, area: Area) -> list[Conductor]:
+        """Wires as flown that may be in an area."""
         low, high = area.box()
         low, high = low - BEYOND_M, high + BEYOND_M
         near = ((self._low <= high) & (self._high >= low)).all(axis=1)
-        wires = (self._line.conductors[row] for row in np.flatnonzero(near).tolist())
-        return [wire for wire in wires if wire.span_id != span.span_id]
+        return [self._flown.conductors[row] for row in np.flatnonzero(near).tolist()]
 
     def _dangers(self, too_near: TooNear, own: Sequence[Conductor]) -> list[Clearance]:
         wires = {wire.conductor_id: wire for wire in own}

@@ -98,7 +98,7 @@ class MeasuredSection:
 def measure(
     area: Area,
     conductors: Sequence[Conductor],
-    others: Sequence[Conductor],
+    flown: Sequence[Conductor],
     points: PointsIn,
     scheme: ClassScheme | None,
     limits: ClearanceLimits | None,
@@ -108,13 +108,13 @@ def measure(
 
     Args:
         area: the section.
-        conductors: of the span.
-        others: of other spans that may be near; their points are no obstacles.
+        conductors: of the span, where it is measured from.
+        flown: of this and other spans, that may be near, as flown; their points are no obstacles.
         points: of the survey.
         scheme: of their class codes; None where heights say what they are.
         limits: for the voltage; None without one.
     """
-    around = look_around(area, [*conductors, *others], points, scheme, settings.few_points)
+    around = look_around(area, flown, points, scheme, settings.few_points)
     here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
     xyz, kind = around.xyz[here], around.kind[here]
     last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)

@@ -14,14 +14,14 @@ from scenenet.clearance.sags import hung, read_sags
 from scenenet.clearance.settings import ClearanceSettings, SpanSag
 from scenenet.core.errors import InputError
 from scenenet.line.records import AS_FLOWN
-from scenenet.synthetic.codes import TOWER
+from scenenet.synthetic.codes import TOWER, TREE
 from scenenet.synthetic.corridor import make_corridor
 from scenenet.synthetic.settings import SyntheticSettings
 
 
 @pytest.fixture(scope="module")
 def corridor():
-    """Points (n, 3) m without those of towers and wires, their true codes, and the line."""
+    """Points (n, 3) m without those of towers, their true codes, and the line."""
     settings = SyntheticSettings(
         towers=3, seed=7, kinds={"lattice_pole": 1.0}, density=8, section=0, margin=20.0
     )
@@ -29,11 +29,8 @@ def corridor():
     parts = list(made)
     xyz = np.concatenate([part.xyz for part in parts])
     codes = np.concatenate([part.truth for part in parts])
-    line = true_line(made.conductors)
-    wires = [wire.catenary.residuals(xyz) for wire in line.conductors]
-    on_wire = np.any([np.hypot(*apart) < 0.5 for apart in wires], axis=0)
-    kept = (codes != TOWER) & ~on_wire
-    return xyz[kept], codes[kept], line
+    kept = codes != TOWER
+    return xyz[kept], codes[kept], true_line(made.conductors)
 
 
 def measured(corridor, sags):
@@ -69,6 +66,28 @@ def test_clearances_are_those_of_the_lower_wires(corridor):
     nearest = cKDTree(np.concatenate(curves)).query((place.x, place.y, place.z))[0]
     assert place.distance == pytest.approx(nearest, abs=0.01)
     assert place.positions != AS_FLOWN
+
+
+def test_what_touches_a_modelled_wire_is_found_and_the_wire_as_flown_is_no_obstacle(corridor):
+    xyz, codes, line = corridor
+    span = max(line.spans, key=lambda span: span.length).span_id
+    c = min(w.catenary.parameter for w in line.conductors if w.span_id == span)
+    sags = (SpanSag(span=span, c=0.5 * c),)
+    low = min(
+        (w.catenary for w in hung(line, sags).conductors if w.span_id == span),
+        key=lambda curve: curve.height(np.array([curve.length / 2]))[0],
+    )
+    crown = low.at(np.linspace(0.45, 0.55, 400) * low.length)
+    crown += np.random.default_rng(0).normal(0, 0.05, crown.shape)
+    full = np.concatenate((xyz, crown)), np.append(codes, np.full(400, TREE)), line
+    [row] = [row for row in measured(full, sags).spans if row.span_id == span]
+    assert row.vegetation < 0.02
+    flown = measured(full, ())
+    for found in (flown, measured(corridor, sags)):
+        for place in found.places:
+            at = np.array([(place.x, place.y, place.z)])
+            apart = [np.hypot(*wire.catenary.residuals(at))[0] for wire in line.conductors]
+            assert min(apart) > 0.2 or place.kind == "wire"
 
 
 def test_attachments_stay_and_earth_wires_are_as_flown_unless_named(corridor):

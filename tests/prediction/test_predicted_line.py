@@ -23,6 +23,7 @@ from scenenet.prediction.found_towers import TowerSearch, find_in_survey
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.survey_prediction import SurveyPrediction
 from scenenet.prediction.writers import predict_to_files
 
 LONE_POLES = DetectionSettings(min_conductor=0)
@@ -41,6 +42,16 @@ def predicted(hung) -> PredictionFiles:
 def rows(path: Path) -> list[dict[str, str]]:
     with path.open(newline="") as stream:
         return list(csv.DictReader(stream))
+
+
+def searches(whole: SurveyPrediction) -> tuple[WireSearch, TowerSearch]:
+    """What wires and towers of a prediction are looked for in."""
+    [wires] = whole.further
+    tau = whole.card.threshold()
+    return (
+        WireSearch(wires.spool, wires.tiles, wires.used.card.threshold()),
+        TowerSearch(whole.spool, whole.tiles, whole.unit_sizes, tau, LONE_POLES),
+    )
 
 
 def test_the_conductor_is_traced_from_pole_to_pole_and_beyond(predicted):
@@ -65,10 +76,7 @@ def test_the_conductor_is_traced_from_pole_to_pole_and_beyond(predicted):
 
 def test_a_tower_that_was_missed_is_found_where_the_line_expects_it(line, model, wire_finder):
     with predict_survey(line, [model, wire_finder], PredictSettings(), LONE_POLES) as whole:
-        [wires] = whole.further
-        search = WireSearch(wires.spool, wires.tiles, wires.used.card.threshold())
-        tau = whole.card.threshold()
-        towers = TowerSearch(whole.spool, whole.tiles, whole.unit_sizes, tau, LONE_POLES)
+        search, towers = searches(whole)
         found = find_in_survey(towers)
         _, missed, _ = sorted(found.towers, key=lambda tower: tower.x)
         poor = found.without({missed.id})
@@ -88,10 +96,7 @@ def test_a_tree_that_was_taken_for_a_tower_is_dropped_and_its_place_listed(
     line, model, wire_finder
 ):
     with predict_survey(line, [model, wire_finder], PredictSettings(), LONE_POLES) as whole:
-        [wires] = whole.further
-        search = WireSearch(wires.spool, wires.tiles, wires.used.card.threshold())
-        tau = whole.card.threshold()
-        towers = TowerSearch(whole.spool, whole.tiles, whole.unit_sizes, tau, LONE_POLES)
+        search, towers = searches(whole)
         found = find_in_survey(towers)
         first, second, _ = sorted(found.towers, key=lambda tower: tower.x)
         middle = (first.x + second.x) / 2, (first.y + second.y) / 2

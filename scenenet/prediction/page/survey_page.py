@@ -107,7 +107,7 @@ def write_page(prediction: SurveyPrediction, path: str | Path) -> None:
     Raises:
         OutputError: the page cannot be written.
     """
-    prediction = as_measured(prediction)
+    flown, prediction = prediction, as_measured(prediction)
     content = PageContent.of(prediction)
     towers = [tower for tower, _ in content.towers]
     spans = [one.span for one in content.spans]
@@ -115,7 +115,7 @@ def write_page(prediction: SurveyPrediction, path: str | Path) -> None:
         path,
         survey_page(
             prediction, content, tower_pictures(prediction, towers, content.budget),
-            span_pictures(prediction, spans, content.budget),
+            span_pictures(flown, spans, content.budget),
         ),
     )  # fmt: skip
 

@@ -57,8 +57,7 @@ def find_clearances(
     if unknown := without_conductor(line, settings.sags):
         listed = ", ".join(map(str, unknown[:MOST_NAMED])) + ", ..." * (len(unknown) > MOST_NAMED)
         print(
-            f"warning: the table of sags names {len(unknown)} spans of which no conductor was "
-            f"found here: {listed}",
+            f"warning: spans in the table of sags of which no conductor was found here: {listed}",
             file=sys.stderr,
         )
     finder = _Finder(line, points, settings, scheme, settings.applied())

@@ -43,7 +43,7 @@ def find_reviews(
         elif owner is None:
             listed = ", ".join(sorted(longest_first)) or "there is none"
             warn(
-                f"left out: {path}: it begins with the name of no new survey ({listed}). "
+                f"left out: {path}: its name does not begin with that of a new survey ({listed}). "
                 "Rename the file"
             )
         else:

@@ -31,5 +31,5 @@ def review_survey(towers: str | Path, decisions: Sequence[str | Path], folder: s
         print(f"warning: {text}", file=sys.stderr)
     if errors:
         listed = "".join(f"\n  {error}" for error in errors)
-        raise InputError(f"{len(errors)} decisions cannot be used, so none is:{listed}")
+        raise InputError(f"{len(errors)} decisions cannot be used, so none was applied:{listed}")
     write_review(review, found, paths, ReviewedFiles.of(found, Path(folder), None))

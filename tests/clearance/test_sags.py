@@ -115,7 +115,10 @@ def test_a_parameter_that_lets_a_wire_lie_on_the_ground_is_refused(corridor):
 
 def test_spans_that_the_survey_does_not_have_are_named(corridor, capsys):
     found = measured(corridor, (SpanSag(span=987, c=900),))
-    assert "names 1 spans of which no conductor was found here: 987" in capsys.readouterr().err
+    assert (
+        "spans in the table of sags of which no conductor was found here: 987"
+        in capsys.readouterr().err
+    )
     assert {row.positions for row in found.spans} == {AS_FLOWN}
 
 

@@ -44,19 +44,22 @@ def test_several_files_are_merged_and_a_file_of_no_survey_is_named(project):
     (reviews / "own.second.csv").write_text("x,y,decision\n544905,4633995,add\n")
     (reviews / "wrong.csv").write_text("x,y,decision\n")
     shown = project.run("results/review/own/own.reviewed.json")
-    assert "left out: reviews/wrong.csv: it begins with the name of no new survey (own)" in shown
+    assert (
+        "left out: reviews/wrong.csv: its name does not begin with that of a new survey (own)"
+        in shown
+    )
     record = read_json(project.results / "review/own/own.reviewed.json")
     assert record["decisions"] == ["reviews/own.csv", "reviews/own.second.csv"]
     assert record["counts"]["added"] == 2
 
 
-def test_rows_that_cannot_be_used_are_all_named_and_the_earlier_list_is_gone(project):
+def test_rows_that_cannot_be_used_are_all_named(project):
     decisions = project.folder / "reviews" / "own.csv"
     decisions.write_text("id,x,y,decision\n7,,,accept\n,,,add\n")
     done = project.snakemake("results/review/own/own.reviewed.json")
     assert done.returncode != 0
     log = (project.results / "logs/review/own.log").read_text()
-    assert log.startswith("Error: 2 decisions cannot be used, so none is:")
+    assert log.startswith("Error: 2 decisions cannot be used, so none was applied:")
     assert "reviews/own.csv: row 2" in log and "reviews/own.csv: row 3" in log
     assert "Traceback" not in log
 

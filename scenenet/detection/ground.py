@@ -51,6 +51,11 @@ class Ground:
         """(N,) m above the ground: planar offsets from the axis and elevation, (N,) m each."""
         return z - self.elevation - (east * self.slope[0] + north * self.slope[1])
 
+    @property
+    def level(self) -> Ground:
+        """A level plane at the elevation of the axis, above which a tower is measured."""
+        return Ground(self.elevation, np.zeros(2))
+
 
 def fit_ground(points: np.ndarray, axis: np.ndarray) -> Ground:
     """The ground around an axis.

@@ -59,7 +59,7 @@ class Head:
     Attributes:
         cells: (T, H) bool, which cells of the plane belong to them.
         left: m, where the cells start, to the right of the axis (negative).
-        low: m above the ground, where the cells start.
+        low: m above the ground at the axis, where the cells start.
         thick: m, half thickness along the line.
     """
 
@@ -82,7 +82,8 @@ class Head:
         return max(map(abs, self.extent))
 
     def covers(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
-        """(N,) bool, whether positions in the plane, (N,) m each, are in a cell."""
+        """(N,) bool, whether positions in the plane are in a cell: ``t`` m to the right of the
+        axis, ``h`` m above the ground there, (N,) each."""
         i = np.floor((t - self.left) / CELL_M).astype(int)
         k = np.floor((h - self.low) / CELL_M).astype(int)
         wide, high = self.cells.shape
@@ -108,11 +109,11 @@ def find_head(
     """The crossarms of a body.
 
     Args:
-        s, t, h: (N,) m, points in the frame of the tower: along the line, to its right, up.
-            Points lower than ``FORK`` of the height may be left out.
+        s, t, h: (N,) m, points in the frame of the tower: along the line, to its right, and above
+            the ground at the axis. Points lower than ``FORK`` of the height may be left out.
         profile: the body.
         apart: m, half the distance between the bodies of a portal.
-        low, high: m above the ground, of the lowest crossarm and the highest conductor.
+        low, high: m above the ground at the axis, of the lowest crossarm and the highest conductor.
         reach: m, of the outermost conductor.
     """
     half = float(profile.half_width(np.array([low]))[0])

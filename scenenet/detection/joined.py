@@ -51,7 +51,7 @@ def _leads(one: Structure, other: Structure, points: Surroundings) -> bool:
         return False
     place = np.array([one.x, one.y])
     near = points(place, float(np.hypot(abs(away), PLANE_M + AIR_M)))
-    s, t, h = line_frame(near, place, one.along, one.ground)
+    s, t, h = line_frame(near, place, one.along, one.ground.level)
     head = (h >= BEAM * tall) & (h <= tall)
     t = t[head] * np.sign(away)
     s = np.abs(s[head])

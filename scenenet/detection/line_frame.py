@@ -32,6 +32,12 @@ def line_frame(
     return east * along[0] + north * along[1], east * along[1] - north * along[0], h
 
 
+def rise(s: np.ndarray, t: np.ndarray, along: np.ndarray, ground: Ground) -> np.ndarray:
+    """(N,) m from the ground at the axis up to the ground at positions along the line and to its
+    right, (N,) m each."""
+    return np.asarray(s * (ground.slope @ along) + t * (ground.slope @ across(along)))
+
+
 def direction_of(spans: tuple[Span, ...]) -> np.ndarray:
     """Unit vector (2,) along the line, across the crossarms: north if there is no conductor."""
     if not spans:

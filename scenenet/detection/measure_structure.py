@@ -16,6 +16,7 @@ from scenenet.detection.line_frame import (
     direction_of,
     line_frame,
     middle_of,
+    rise,
     sides_of,
     unit,
 )
@@ -127,7 +128,8 @@ def _measure_body(
     half = profile.half_width(h) + MARGIN_M
     inside = np.maximum(np.abs(s), np.abs(t)) <= half
     foot = _foot(s, t, h, profile, height)
-    of_body = h[inside & (h >= foot)]
+    level = h + rise(s, t, along, ground)
+    of_body = level[inside & (h >= foot)]
     top, upright = _top(of_body, height, profile.level, foot)
     if top is None or (of_body <= top).sum() < POINTS_PER_M * (top - foot):
         return None
@@ -145,7 +147,7 @@ def _with_twin(body: Structure, points: np.ndarray) -> Structure:
     away = at / 2 * across(body.along)
     x, y = (axis + away).tolist()
     ground = fit_ground(points, np.array([x, y]))
-    top = body.height + body.ground.elevation + float(body.ground.slope @ away)
+    top = body.height + body.ground.elevation
     return replace(body, x=x, y=y, ground=ground, apart=abs(at) / 2, height=top - ground.elevation)
 
 
@@ -173,10 +175,11 @@ def _with_head(
     highest = max(body.height, *(span.highest for span in line))
     reach = max(abs(side) for side in sides)
     from_fork = min(lowest, FORK * body.height)
-    s, t, h = line_frame(points, np.array([body.x, body.y]), body.along, body.ground, from_fork)
+    place, level = np.array([body.x, body.y]), body.ground.level
+    s, t, h = line_frame(points, place, body.along, level, from_fork)
     head = find_head(s, t, h, body.profile, body.apart, lowest, highest, reach)
     shape = replace(body, head=head, height=highest + PEAK_M)
-    top = max(body.height, float(h[shape.in_arm(s, t, h)].max(initial=0.0)))
+    top = max(body.height, float(h[head.covers(t, h) & (np.abs(s) <= head.thick)].max(initial=0.0)))
     return replace(shape, height=top)
 
 

@@ -15,7 +15,7 @@ from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, OVER_M, POLE_M,
 from scenenet.detection.conductors import Span
 from scenenet.detection.ground import Ground
 from scenenet.detection.head import ARM_M, Head
-from scenenet.detection.line_frame import line_frame, sides_of
+from scenenet.detection.line_frame import line_frame, rise, sides_of
 from scenenet.detection.profile import Profile
 
 MARGIN_M = 0.1
@@ -29,7 +29,7 @@ class Structure:
     Attributes:
         x, y: m, axis.
         ground: the ground around the axis.
-        height: m, from the ground to the top.
+        height: m, from the ground at the axis to the top.
         foot: m above the ground from which points are the tower's own; scrub is below.
         along: (2,) unit vector along the line.
         profile: the body around the axis; its s and t are 0.
@@ -98,11 +98,15 @@ class Structure:
         """(N,) bool, which points in its frame are of the body."""
         half = self.profile.half_width(h) + MARGIN_M
         inside = np.maximum(np.abs(s), np.abs(np.abs(t) - self.apart)) <= half
-        return inside & (h >= self.foot) & (h <= self.height + MARGIN_M)
+        return inside & (h >= self.foot) & (self._level(s, t, h) <= self.height + MARGIN_M)
 
     def in_arm(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
         """(N,) bool, which points in its frame are of the crossarms."""
-        return (np.abs(s) <= self.head.thick) & self.head.covers(t, h)
+        return (np.abs(s) <= self.head.thick) & self.head.covers(t, self._level(s, t, h))
+
+    def _level(self, s: np.ndarray, t: np.ndarray, h: np.ndarray) -> np.ndarray:
+        """(N,) m above the ground at the axis: on a slope, a crossarm is level."""
+        return h + rise(s, t, self.along, self.ground)
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,18 @@ def test_its_record_says_the_same_of_every_point(tower_scene, kind, height):
     assert to_record(again) == to_record(shape)
 
 
+@pytest.mark.parametrize(("kind", "height"), [("lattice", 35.0), ("h_frame", 18.0)])
+def test_its_height_counts_from_the_ground_at_the_axis_where_a_slope_falls_below_the_crossarms(
+    tower_scene, kind, height
+):
+    scene = tower_scene(kind, height, bearing=0.0, slope=0.4)
+    shape = measured(scene, height + 2)
+    precision, recall = points_score(shape, scene)
+    assert shape.height == pytest.approx(height, abs=0.4)
+    assert precision > 0.9
+    assert recall > 0.8
+
+
 @pytest.mark.parametrize("bearing", [0, 17, 45, 90, 133])
 def test_the_direction_of_the_line_does_not_matter(tower_scene, bearing):
     scene = tower_scene("lattice", 35.0, bearing)

@@ -32,6 +32,10 @@ WORST_M = 0.12
 """m, greatest root mean square distance of the points of a wire from its catenary. Leaves within
 the tube of a wire are about 0.17 m from it; a scanner measures to 0.05 m."""
 
+STEEP = 0.4
+"""m per metre, rise of a span from which its wires are looked for among uncertain points too, where
+the certain ones show none: observers know wires that are nearly level."""
+
 LONG_M = 150.0
 """m, length from which the points of a wire say for certain that it is too straight."""
 
@@ -99,9 +103,11 @@ class TracedSpan:
     wires: tuple[HungWire, ...]
 
 
-def traced(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> tuple[HungWire, ...]:
+def traced(
+    points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float = 0.0
+) -> tuple[HungWire, ...]:
     """The wires among some points, each between its first and its last point. Points that are not
-    certain count where other wires of the span show that wires hang there.
+    certain count where other wires of the span show that wires hang there, and in steep spans.
 
     The answer is kept: a line is searched once more with the towers that it asked for, and most of
     its spans stay the same.
@@ -109,24 +115,29 @@ def traced(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> tuple[Hung
     Args:
         rows: (n,) of the points.
         frame: of the span.
+        rise: of the span, as in ``trace_wires``.
     """
-    question = frame.x, frame.y, *frame.direction.tolist(), frame.length
+    question = frame.x, frame.y, *frame.direction.tolist(), frame.length, rise
     key = hashlib.sha256(repr(question).encode() + rows.tobytes()).digest()
     if key not in points.answers:
-        points.answers[key] = tuple(_traced(points, rows, frame))
+        points.answers[key] = tuple(_traced(points, rows, frame, rise))
     return points.answers[key]
 
 
-def _traced(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> Iterator[HungWire]:
+def _traced(
+    points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float
+) -> Iterator[HungWire]:
     certain = points.certain[rows]
     stz = frame.to_frame(points.xyz[rows])
-    wires = trace_wires(stz[certain])
+    wires = trace_wires(stz[certain], rise)
     number = np.flatnonzero(certain)
-    if wires and not certain.all():
+    if not wires and abs(rise) > STEEP:
+        wires, number = trace_wires(stz, rise), np.arange(len(stz))
+    elif wires and not certain.all():
         above = np.array([wire.fit.catenary.residuals(stz)[1] for wire in wires])
         doubtful = ~certain & (above.max(axis=0) > -BELOW_M) & (above.min(axis=0) < ABOVE_M)
         number = np.flatnonzero(certain | doubtful)
-        wires = trace_wires(stz[number])
+        wires = trace_wires(stz[number], rise)
     for wire in wires:
         catenary = wire.fit.catenary
         taut = catenary.parameter > TAUTEST_M and catenary.length > LONG_M

@@ -18,7 +18,7 @@ APART_M = 0.5
 0.5 m apart, conductors 0.8 m or more."""
 
 STEEPEST = 0.5
-"""Greatest rise of a wire per metre along the span, also of one on a steep slope."""
+"""Greatest rise of a wire per metre along the span, beyond that of the span itself."""
 
 MIN_POINTS = 3
 MIN_SHARE = 0.3
@@ -64,9 +64,9 @@ def window_of(length: float) -> float:
     return float(np.clip(length / WINDOWS, SHORTEST_WINDOW_M, WINDOW_M))
 
 
-def find_pieces(stz: np.ndarray, length: float = WINDOW_M) -> Pieces:
-    """The pieces of ``length`` m among points (n, 3) m in the frame of a span. Windows overlap by
-    half."""
+def find_pieces(stz: np.ndarray, length: float = WINDOW_M, rise: float = 0.0) -> Pieces:
+    """The pieces of ``length`` m among points (n, 3) m in the frame of a span that rises by
+    ``rise`` m per metre. Windows overlap by half."""
     order = np.argsort(stz[:, 0], kind="stable")
     if len(order) == 0:
         return Pieces(np.empty((0, 3)), np.empty((0, 2)), np.empty(0), np.empty(0, int), [])
@@ -76,19 +76,20 @@ def find_pieces(stz: np.ndarray, length: float = WINDOW_M) -> Pieces:
     windows = np.arange(first - 1, last + 1)
     lows = np.searchsorted(ordered[:, 0], windows * step)
     highs = np.searchsorted(ordered[:, 0], windows * step + length)
+    gradients = rise + GRADIENTS
     middles, slopes, weights, numbers, members = [], [], [], [], []
     for window, low, high in zip(windows.tolist(), lows.tolist(), highs.tolist(), strict=True):
         if high - low < MIN_POINTS:
             continue
         points = ordered[low:high]
-        gradient = GRADIENTS[_gradient((window + 1) * step, points, GRADIENTS)]
+        gradient = gradients[_gradient((window + 1) * step, points, gradients)]
         rows, ends = _groups((window + 1) * step, points, gradient)
         lines = _straight(points, rows, ends)
         for number, (*middle, by_t, by_z, reach, spread) in enumerate(lines.tolist()):
             own = order[low + rows[ends[number] : ends[number + 1]]]
             if len(own) < MIN_POINTS or reach < MIN_SHARE * length:
                 continue
-            if abs(by_z) > STEEPEST or spread > THICKEST_M:
+            if abs(by_z - rise) > STEEPEST or spread > THICKEST_M:
                 continue
             middles.append(middle)
             slopes.append((by_t, by_z))

@@ -52,7 +52,8 @@ def find_spans(
         ):
             continue
         rows = points.beside(frame, REACH_M)
-        wires = tuple(_between(traced(points, rows[free[rows]], frame), frame, first, last))
+        rise = (last.base - first.base) / frame.length
+        wires = tuple(_between(traced(points, rows[free[rows]], frame, rise), frame, first, last))
         if wires:
             for wire in wires:
                 free[wire.rows] = False

@@ -77,16 +77,17 @@ class Wire:
     bundle: int = 1
 
 
-def trace_wires(stz: np.ndarray, limit: int = 80) -> list[Wire]:
+def trace_wires(stz: np.ndarray, rise: float = 0.0, limit: int = 80) -> list[Wire]:
     """The wires among points (n, 3) m in the frame of a span, the longest first.
 
     Args:
+        rise: m per metre along the span, of the straight line between the feet of its towers.
         limit: wires, at most.
     """
     if len(stz) == 0:
         return []
     window = window_of(float(np.ptp(stz[:, 0])))
-    pieces = find_pieces(stz, window)
+    pieces = find_pieces(stz, window, rise)
     left = np.ones(len(pieces), bool)
     free = np.ones(len(stz), bool)
     found: list[Wire] = []

@@ -11,7 +11,7 @@ from fixtures.line_scene import KnownLine, points_on
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.find_line import find_line
-from scenenet.line.hung import LineTower
+from scenenet.line.hung import STEEP, LineTower
 from scenenet.line.records import SurveyLine
 from scenenet.line.wire_points import WirePoints
 
@@ -140,3 +140,20 @@ def test_nothing_is_found_where_there_is_nothing(poles):
 
 def test_the_record_of_a_line_is_read_back(line):
     assert SurveyLine.from_json(line.to_json()) == line
+
+
+@pytest.mark.parametrize("slope", [0.3, 0.7])
+def test_conductors_of_a_steep_span_are_found_where_few_of_their_points_are_certain(slope):
+    """Observers of wires answer to those that are nearly level."""
+    length, rng = 70.0, np.random.default_rng(0)
+    rise = slope * length
+    towers = [LineTower(1, 0.0, 0.0, 100.0, 18.0), LineTower(2, length, 0.0, 100.0 + rise, 18.0)]
+    wires = [Catenary((0.0, t, 116.0), (length, t, 116.0 + rise), 700.0) for t in (-1.0, 0.0, 1.0)]
+    xyz = np.concatenate([points_on(wire, 0.8, rng) for wire in wires])
+    certain = (xyz[:, 0] < 18.0) | (slope < STEEP)
+    line = find_line(WirePoints(xyz, certain), towers, lambda place, radius: place[None])
+    [span] = line.spans
+    assert (span.conductors, span.from_tower, span.to_tower) == (3, 1, 2)
+    middles = [c.catenary.at_shares(np.array([0.5]))[0, 2] for c in line.conductors]
+    expected = [wire.at_shares(np.array([0.5]))[0, 2] for wire in wires]
+    assert middles == pytest.approx(expected, abs=0.05)

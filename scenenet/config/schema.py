@@ -163,8 +163,9 @@ class Config(Settings):
     study_crops: int | None = Field(
         None,
         ge=1,
-        description="most training crops of a training in a study, evenly from those of the split, "
-        "so that the studies of a large dataset take less time; null for all of them",
+        description="most crops of a part in a study, to train on, to choose tau on and to score, "
+        "evenly from those of the split, so that the studies of a large dataset take less time; "
+        "null for all of them",
     )
     studies: tuple[StudySettings, ...] = Field(
         (),

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
     from scenenet.figures import Picture
 
 FACTS = (
-    "tau", "alive", "training_crops", "parameters", "epochs", "loss", "lowest_weight",
-    "lowest_shape",
+    "tau", "alive", "training_crops", "scored_crops", "parameters", "epochs", "loss",
+    "lowest_weight", "lowest_shape",
 )  # fmt: skip
 
-GIVEN = ("training_crops", "parameters", "epochs")
+GIVEN = ("training_crops", "scored_crops", "parameters", "epochs")
 """Facts that the variant determines; they have no spread over seeds."""
 
 

@@ -32,7 +32,8 @@ from scenenet.training.train import fit
 
 COLUMNS = (
     "variant", "seed", "kind", "alive", "tau", *SCORES,
-    "average_precision", "validation_f05", "training_crops", "parameters", "epochs", "loss",
+    "average_precision", "validation_f05", "training_crops", "scored_crops", "parameters", "epochs",
+    "loss",
     "lowest_weight", "lowest_shape",
 )  # fmt: skip
 
@@ -62,7 +63,8 @@ def run_study(
         out: CSV file, columns ``COLUMNS``; ``lowest_weight`` and ``lowest_shape`` are the lowest
             mixing weight and shape parameter of a SCENE-Net after training.
         out_times: CSV file, columns variant, seed, training_seconds (s) and inference_ms.
-        crops: most training crops of a training, evenly from those of the split; None for all.
+        crops: most crops of a part to train on, to choose tau on and to score, evenly from those
+            of the split; None for all.
 
     Returns:
         the table of scores.
@@ -70,7 +72,7 @@ def run_study(
     Raises:
         InputError: there are too few crops, or a variant cannot be trained.
     """
-    data = _Crops(crop_manifests)
+    data = _Crops(crop_manifests, crops)
     trained: dict[Any, tuple[VoxelModel | None, dict[str, Any]]] = {}
     rows = []
     plans = [(plan, seed) for plan in study.plans(model, voxels, split) for seed in study.seeds]
@@ -78,12 +80,12 @@ def run_study(
         parts = data.parts(plan.split)
         key = (plan.model.model_dump_json(), plan.voxels, plan.split, seed)
         if key not in trained:
-            training = data.samples(plan.voxels, _evenly(parts["train"], crops))
+            training = data.samples(plan.voxels, parts["train"])
             trained[key] = _trained(training, plan.model, seed)
         result, facts = trained[key]
         validation = data.samples(plan.applied_voxels, parts["validation"])
         scored = data.samples(plan.applied_voxels, parts[study.part])
-        row = {"variant": plan.name, "seed": seed, **facts}
+        row = {"variant": plan.name, "seed": seed, **facts, "scored_crops": len(scored)}
         if result is None:
             rows.append(row | _nothing_found(scored))
         else:
@@ -94,18 +96,22 @@ def run_study(
 class _Crops:
     """The crops on the grids and in the parts that the variants need."""
 
-    def __init__(self, manifests: Sequence[str | Path]) -> None:
+    def __init__(self, manifests: Sequence[str | Path], most: int | None) -> None:
+        """The crops of these manifests, at most ``most`` of a part; all for None."""
         self._manifests = list(manifests)
+        self._most = most
         self._clouds = CropClouds(manifests)
         self._samples: dict[tuple[VoxelSettings, str], VoxelSample] = {}
-        self._parts: dict[SplitSettings, dict[str, list[str]]] = {}
+        self._parts: dict[SplitSettings, dict[str, Sequence[str]]] = {}
 
-    def parts(self, settings: SplitSettings) -> dict[str, list[str]]:
+    def parts(self, settings: SplitSettings) -> dict[str, Sequence[str]]:
         """Ids of the crops of each part."""
         if settings not in self._parts:
             table = split_crops(self._manifests, settings)
             groups = table.groupby("part")["crop"].apply(list).to_dict()
-            self._parts[settings] = {str(part): crops for part, crops in groups.items()}
+            self._parts[settings] = {
+                str(part): _evenly(crops, self._most) for part, crops in groups.items()
+            }
         return self._parts[settings]
 
     def samples(self, grid: VoxelSettings, ids: Sequence[str]) -> list[VoxelSample]:

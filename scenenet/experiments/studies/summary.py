@@ -21,9 +21,9 @@ def summarise(study: StudySettings, runs: pd.DataFrame, thesis: Thesis) -> pd.Da
 
     Returns:
         variant, n_seeds; alive (number of live models) and live_share; mean and ``_std`` of each
-        score over all seeds; mean of parameters and training_crops; negative_share (seeds that end
-        with a negative parameter); lowest_weight and lowest_shape over all seeds; ``thesis_``
-        columns with the published scores.
+        score over all seeds; mean of parameters, training_crops and scored_crops; negative_share
+        (seeds that end with a negative parameter); lowest_weight and lowest_shape over all seeds;
+        ``thesis_`` columns with the published scores.
     """
     rows = []
     for variant in study.all_variants():
@@ -36,7 +36,7 @@ def summarise(study: StudySettings, runs: pd.DataFrame, thesis: Thesis) -> pd.Da
         }
         for name in SCORES:
             row |= {name: group[name].mean(), f"{name}_std": group[name].std()}
-        for name in ("parameters", "training_crops"):
+        for name in ("parameters", "training_crops", "scored_crops"):
             row[name] = group[name].mean()
         lowest = group[["lowest_weight", "lowest_shape"]].min(axis=1).dropna()
         row["negative_share"] = (lowest < 0).mean() if len(lowest) else math.nan

@@ -29,6 +29,7 @@ def studies(context: ReportContext) -> Section | None:
             Column("parameters", "parameters", "count"),
             *(NEGATIVE if frame["negative_share"].max() > 0 else ()),
             Column("training_crops", "training crops", "count"),
+            Column("scored_crops", "crops scored", "count"),
         ]
         caption = (
             f"Scores on the {study.part} crops, mean ± standard deviation over "

@@ -8,7 +8,7 @@ import torch
 
 from scenenet.dataset.crops import CropSettings, cut_crops
 from scenenet.dataset.labelled_towers import TowerSettings, survey_towers
-from scenenet.dataset.split import SplitSettings
+from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.voxels import VoxelSettings
 from scenenet.experiments.published import Thesis
 from scenenet.experiments.studies import run
@@ -222,7 +222,7 @@ def test_initial_models_are_scored_without_training(crops, tmp_path):
     assert one != other
 
 
-def test_a_study_may_train_on_a_part_of_the_crops(crops, tmp_path, monkeypatch):
+def test_a_study_may_be_limited_to_some_crops_of_each_part(crops, tmp_path, monkeypatch):
     trained_on = []
     fit = run.fit
 
@@ -233,9 +233,13 @@ def test_a_study_may_train_on_a_part_of_the_crops(crops, tmp_path, monkeypatch):
     monkeypatch.setattr(run, "fit", recorded)
     defined = study(seeds=(0,), variants=[{"name": "short", "changes": {"training.epochs": 1}}])
     split = SPLIT.model_copy(update={"train": 0.6, "test": 0.2})
+    scored = []
     for most in (None, 9, 2):
         table = run_study(crops, defined, MODEL, GRID, split, *files(tmp_path), most)
         assert list(table["training_crops"]) == [len(trained_on[-1])]
+        scored += list(table["scored_crops"])
+    parts = split_crops(crops, split)["part"].value_counts()
+    assert scored == [parts["test"], parts["test"], min(parts["test"], 2)]
     every, nine, part = trained_on
     assert nine == every and len(every) > 2
     assert part == [every[0], every[len(every) // 2]]

@@ -1,4 +1,4 @@
-"""The worker that decompresses LAZ points with laspy, in a separate process.
+"""The worker that decompresses LAZ points with lazrs, in a separate process.
 
 A damaged file can make a LAZ decoder loop forever, panic, abort its process or allocate all memory.
 This then ends the worker alone: the parent (``isolation``) detects it and names the file.
@@ -18,11 +18,13 @@ chunks (point formats 6 to 10) store their number of points, as does the table o
 size. Other chunks are full except the last, and a coder leaves no byte of a chunk unused: if the
 points of the last chunk can be decoded without its last bytes, there are more of them.
 
-It imports nothing of the package, so that it starts fast.
+It imports neither the package nor laspy or numpy, which take most of a second: a line of a thousand
+tiles is read several times. What it has to know of the header comes with the job.
 """
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
 import os
@@ -30,19 +32,15 @@ import resource
 import signal
 import struct
 import sys
-from collections.abc import Mapping
+from base64 import b64decode
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-import numpy as np
-
 if TYPE_CHECKING:
-    import laspy
+    import lazrs
 
 FRAME = struct.Struct("<cI")
-SLOW_IMPORTS = ("pyproj", "requests")
-"""Optional imports of laspy that the worker does not need; they take half of its start-up time."""
-
 
 POINTWISE, LAYERED = 1, 3
 """Compressors: one stream of points, and chunks with a layer for each field."""
@@ -60,7 +58,7 @@ class WrongCountError(ValueError):
     """The header does not claim as many points as the chunks hold."""
 
 
-def check_count(header: laspy.LasHeader, job: Mapping[str, Any], out: BinaryIO) -> None:
+def check_count(job: Mapping[str, Any], record: bytes, out: BinaryIO) -> None:
     """Compare the number of points in the header with what the chunks hold.
 
     Raises:
@@ -68,12 +66,11 @@ def check_count(header: laspy.LasHeader, job: Mapping[str, Any], out: BinaryIO) 
     """
     import lazrs
 
-    record = header.vlrs.get("LasZipVlr")[0].record_data
     compressor = struct.unpack_from("<H", record)[0]
     with Path(job["path"]).open("rb") as stream:
-        stream.seek(header.offset_to_point_data)
+        stream.seek(job["offset"])
         if compressor == POINTWISE:
-            _check_stream(header, record, stream.read(), job, out)
+            _check_stream(job, record, stream.read(), out)
             return
         layout = lazrs.LazVlr(record)
         chunks = lazrs.read_chunk_table(stream, layout)
@@ -81,7 +78,7 @@ def check_count(header: laspy.LasHeader, job: Mapping[str, Any], out: BinaryIO) 
             chunks.pop()
         start, held = stream.tell(), 0
         if compressor == LAYERED:
-            whole, layers = header.point_format.size, _layers(record)
+            whole, layers = job["size"], _layers(record)
             for _, size in chunks:
                 stream.seek(start + whole)
                 count, *lengths = struct.unpack(f"<{1 + layers}I", stream.read(4 + 4 * layers))
@@ -96,11 +93,11 @@ def check_count(header: laspy.LasHeader, job: Mapping[str, Any], out: BinaryIO) 
             full = sum(points for points, _ in chunks[:-1])
             stream.seek(start + sum(size for _, size in chunks[:-1]))
             data = stream.read(chunks[-1][1] if chunks else 0)
-            _check_last(header, record, full, data, layout.chunk_size())
+            _check_last(job, record, full, data, layout.chunk_size())
             return
-    if held != header.point_count:
+    if held != job["points"]:
         raise WrongCountError(
-            f"the header claims {header.point_count} points, but the compressed chunks hold {held}"
+            f"the header claims {job['points']} points, but the compressed chunks hold {held}"
         )
 
 
@@ -115,13 +112,13 @@ def _layers(record: bytes) -> int:
 
 
 def _check_last(
-    header: laspy.LasHeader, record: bytes, full: int, data: bytes, chunk_size: int
+    job: Mapping[str, Any], record: bytes, full: int, data: bytes, chunk_size: int
 ) -> None:
     """Check the last chunk, ``data``, that follows ``full`` points."""
     import lazrs
 
     def fits(n: int, data: bytes) -> bool:
-        points = bytearray(n * header.point_format.size)
+        points = bytearray(n * job["size"])
         everything = lazrs.DecompressionSelection(lazrs.SELECTIVE_DECOMPRESS_ALL)
         try:
             lazrs.decompress_points_with_chunk_table(
@@ -131,51 +128,68 @@ def _check_last(
             return False
         return True
 
-    n = header.point_count - full
+    n = job["points"] - full
     if not 0 < n <= chunk_size or not fits(n, data):
-        raise WrongCountError(_claims(header, "a different number"))
-    by_return = int(header.number_of_points_by_return.sum()) - full
+        raise WrongCountError(_claims(job, "a different number"))
+    by_return = job["by_return"] - full
     if fits(n, data[:-LEFT_OVER]) or (n < by_return <= chunk_size and fits(by_return, data)):
-        raise WrongCountError(_claims(header, "more"))
+        raise WrongCountError(_claims(job, "more"))
 
 
-def _check_stream(
-    header: laspy.LasHeader, record: bytes, data: bytes, job: Mapping[str, Any], out: BinaryIO
-) -> None:
+def _check_stream(job: Mapping[str, Any], record: bytes, data: bytes, out: BinaryIO) -> None:
     """Check one stream of points without chunks."""
     import lazrs
 
     stream = lazrs.LasZipDecompressor(io.BytesIO(data[:-LEFT_OVER]), record)
-    left = header.point_count
+    left = job["points"]
     while left:
         n = min(job["piece"], left)
         signal.alarm(job["watchdog_s"])
         try:
-            stream.decompress_many(bytearray(n * header.point_format.size))
+            stream.decompress_many(bytearray(n * job["size"]))
         except lazrs.LazrsError:
             return  # the last bytes are needed
         out.write(FRAME.pack(b"W", 0))
         out.flush()
         left -= n
-    raise WrongCountError(_claims(header, "more"))
+    raise WrongCountError(_claims(job, "more"))
 
 
-def _claims(header: laspy.LasHeader, held: str) -> str:
-    by_return = int(header.number_of_points_by_return.sum())
+def _claims(job: Mapping[str, Any], held: str) -> str:
     also = ""
-    if by_return not in (0, header.point_count):
-        also = f" (its numbers of points by return sum to {by_return})"
-    return f"the header claims {header.point_count} points, but the file holds {held}{also}"
+    if job["by_return"] not in (0, job["points"]):
+        also = f" (its numbers of points by return sum to {job['by_return']})"
+    return f"the header claims {job['points']} points, but the file holds {held}{also}"
 
 
-def open_points(job: Mapping[str, Any]) -> laspy.LasReader:
-    """laspy's reader of the points of ``job``."""
-    import laspy
+@contextlib.contextmanager
+def open_points(
+    job: Mapping[str, Any], record: bytes
+) -> Iterator[lazrs.ParLasZipDecompressor | lazrs.LasZipDecompressor]:
+    """The decompressor of the points of ``job``."""
+    import lazrs
 
-    fields = laspy.DecompressionSelection.all()
+    size = lazrs.LazVlr(record).item_size()
+    if size != job["size"]:
+        raise ValueError(
+            f"points of {size} bytes are compressed, and the header says {job['size']}"
+        )
+    fields = lazrs.SELECTIVE_DECOMPRESS_ALL
     if job["places_only"]:  # layered files store each field separately, so the others are skipped
-        fields = laspy.DecompressionSelection.base().decompress_z().decompress_classification()
-    return laspy.open(job["path"], read_evlrs=False, decompression_selection=fields)
+        fields = (
+            lazrs.SELECTIVE_DECOMPRESS_XY_RETURNS_CHANNEL
+            | lazrs.SELECTIVE_DECOMPRESS_Z
+            | lazrs.SELECTIVE_DECOMPRESS_CLASSIFICATION
+        )
+    with Path(job["path"]).open("rb") as stream:
+        stream.seek(job["offset"])
+        arguments = stream, record, lazrs.DecompressionSelection(fields)
+        try:
+            decompressor = lazrs.ParLasZipDecompressor(*arguments)
+        except lazrs.LazrsError:  # not in chunks, which only one core can decompress
+            stream.seek(job["offset"])
+            decompressor = lazrs.LasZipDecompressor(*arguments)
+        yield decompressor
 
 
 def limit_memory(max_bytes: int) -> None:
@@ -199,19 +213,19 @@ def send_points(job: Mapping[str, Any], out: BinaryIO) -> None:
     # later. It is a signal with its default action, so it works inside a decoder that never returns
     # to Python.
     signal.alarm(job["watchdog_s"])
-    with open_points(job) as reader:
-        check_count(reader.header, job, out)
-        total = reader.header.point_count
+    record = b64decode(job["record"])
+    check_count(job, record, out)
+    with open_points(job, record) as decompressor:
+        total = job["points"]
         done = 0
         while done < total:
             n = min(job["piece"], job["chunk"] - done % job["chunk"], total - done)
             signal.alarm(job["watchdog_s"])
-            points = reader.read_points(n)
+            points = bytearray(n * job["size"])
+            decompressor.decompress_many(points)
             signal.alarm(0)  # the parent may process a piece for any time
-            if len(points) != n:
-                raise ValueError(f"{len(points)} points instead of {n}")
             out.write(FRAME.pack(b"P", n))
-            out.write(np.frombuffer(points.array, np.uint8).data)
+            out.write(points)
             out.flush()
             done += n
     out.write(FRAME.pack(b"D", 0))
@@ -226,8 +240,6 @@ def main() -> int:
     out = os.fdopen(os.dup(1), "wb", buffering=1 << 16)
     os.dup2(2, 1)  # output of libraries must not mix with the frames
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    for name in SLOW_IMPORTS:
-        sys.modules[name] = None  # type: ignore[assignment]  # as if it were not installed
     limit_memory(job["max_bytes"])
     try:
         send_points(job, out)

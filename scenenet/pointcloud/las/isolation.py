@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from base64 import b64encode
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -40,8 +41,14 @@ REMEDY = (
 def _job(
     header: CheckedHeader, chunk_points: int, places_only: bool, stall_seconds: float
 ) -> dict[str, Any]:
+    las = header.las
     return {
         "path": str(header.path.resolve()),
+        "record": b64encode(las.vlrs.get("LasZipVlr")[0].record_data).decode(),
+        "offset": las.offset_to_point_data,
+        "points": las.point_count,
+        "size": las.point_format.size,
+        "by_return": int(las.number_of_points_by_return.sum()),
         "places_only": places_only,
         "chunk": chunk_points,
         "piece": PIECE_POINTS,

@@ -228,6 +228,11 @@ class GeneoModel(VoxelModel):
         weights = self.mixing_weights().detach().tolist()
         return numbers | {f"lambda.{n}": w for n, w in zip(self.names, weights, strict=True)}
 
+    def _number_names(self) -> list[str]:
+        """The names of ``_own_numbers``."""
+        shapes = [f"{name}.{parameter.name}" for name, parameter in self.shape_list()]
+        return [*shapes, *(f"lambda.{name}" for name in self.names)]
+
     def set_shape_parameters(self, numbers: Mapping[str, float]) -> None:
         """Set the numbers that ``shape_parameters`` returns; the last mixing weights are derived.
 
@@ -235,16 +240,17 @@ class GeneoModel(VoxelModel):
             InputError: a number is missing, unknown or not finite, or the mixing weights do not
                 sum to 1.
         """
-        expected = self.shape_parameters()
-        if missing := sorted(expected.keys() - numbers.keys()):
+        stages = [(prefix, model, model._number_names()) for prefix, model in self.stages()]
+        expected = {f"{prefix}{name}" for prefix, _, names in stages for name in names}
+        if missing := sorted(expected - numbers.keys()):
             raise InputError(f"parameters are missing: {', '.join(missing)}")
-        if unknown := sorted(numbers.keys() - expected.keys()):
+        if unknown := sorted(numbers.keys() - expected):
             raise InputError(f"parameters are unknown: {', '.join(unknown)}")
         for name, number in numbers.items():
             if not abs(number) <= torch.finfo(torch.float32).max:
                 raise InputError(f"{name} is {number:g}, not a finite number")
-        for prefix, model in self.stages():
-            own = {name: numbers[f"{prefix}{name}"] for name in model._own_numbers()}
+        for prefix, model, names in stages:
+            own = {name: numbers[f"{prefix}{name}"] for name in names}
             total = sum(own[f"lambda.{name}"] for name in model.names)
             if abs(total - 1) > 1e-4:
                 raise InputError(f"mixing weights sum to {total:.6f}, not to 1")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Self
 
 import numpy as np
@@ -48,6 +48,8 @@ CORNER_M = 0.5
 """m that a cross-section reaches beyond the corners of a body: half a voxel."""
 TINY = 1e-9
 """Smallest mixing weight that is stored; smaller ones are replaced by it."""
+MOST_KEPT = 512
+"""Sampled kernels that a model keeps."""
 LOGIT_END = 16.0
 """Largest |logit|: float32 cannot distinguish a sigmoid beyond it from its bound."""
 
@@ -106,6 +108,7 @@ class MetricSceneNet(GeneoModel):
         self.metric = metric or MetricSettings()
         self.first = first
         self.evidence: dict[str, Evidence] = {}
+        self._sampled: dict[tuple[str, float], tuple[Hashable, Tensor]] = {}
         for label, value in self._own_fixed().items():
             name, symbol = label.rsplit(".", 1)
             parameter = next(p for p in self.parameters_of(name) if p.name == symbol)
@@ -360,12 +363,7 @@ class MetricSceneNet(GeneoModel):
     def kernels(self) -> Tensor:
         shapes = self._shapes()
         extents = self._extents(shapes)
-        return torch.stack(
-            [
-                self._sample(name, shapes[name], extents[name], along_x=True)[0]
-                for name in self.names
-            ]
-        )
+        return torch.stack([self._along_x(name, shapes[name], extents[name]) for name in shapes])
 
     def orbits(self) -> list[Tensor]:
         shapes = self._shapes()
@@ -375,6 +373,23 @@ class MetricSceneNet(GeneoModel):
     def orbit_of(self, name: str, azimuth: float = 0.0) -> Tensor:
         shapes = self._shapes()
         return self._sample(name, shapes[name], self._extents(shapes)[name], azimuth)
+
+    def _along_x(self, name: str, shape: dict[str, Tensor], extent: Extent) -> Tensor:
+        """The kernel of a GENEO, or the one along x, (kz, ky, kx).
+
+        Without a gradient the last one is kept: whoever varies a number of one GENEO, or a weight,
+        asks for those of the others again.
+        """
+        if torch.is_grad_enabled():
+            return self._sample(name, shape, extent, along_x=True)[0]
+        made_from = (self.kernel_size, extent, *(float(number) for number in shape.values()))
+        kept, kernel = self._sampled.get((name, self.voxel_size), (None, None))
+        if kernel is None or kept != made_from:
+            kernel = self._sample(name, shape, extent, along_x=True)[0]
+            if len(self._sampled) >= MOST_KEPT:  # each crop may have voxels of its own size
+                self._sampled.clear()
+            self._sampled[name, self.voxel_size] = made_from, kernel
+        return kernel
 
     def _sample(
         self,

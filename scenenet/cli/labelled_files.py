@@ -1,16 +1,15 @@
-"""Training and scoring with labelled files, without the workflow."""
+"""Labelled files as crops on grids, for commands that train and score without the workflow."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 from scenenet.cli.inputs import Failures
 from scenenet.core.errors import InputError, in_file, warn
 from scenenet.core.outputs import check_space
-from scenenet.core.scratch import scratch_folder, temporary_directory
+from scenenet.core.scratch import temporary_directory
 from scenenet.core.unchanged import unchanged
 from scenenet.dataset.crops import (
     Crop,
@@ -26,27 +25,15 @@ from scenenet.dataset.split import SplitSettings, split_crops
 from scenenet.dataset.square_settings import SquareSettings
 from scenenet.dataset.squares import cut_squares
 from scenenet.dataset.voxel_cache import VOXEL_BYTES, Dataset, build, load
-from scenenet.dataset.voxels import VoxelSettings
-from scenenet.detection.settings import DetectionSettings
+from scenenet.dataset.voxels import VoxelSample, VoxelSettings
 from scenenet.evaluation.surveys import LabelledSurvey
-from scenenet.evaluation.tune import with_answer
-from scenenet.interpretability.determination import determination
-from scenenet.interpretability.parameter_sentences import parameters_of
 from scenenet.measurement.registry import PRESENCE, measurement_named
-from scenenet.metrics.voxel_scores import VoxelScores
-from scenenet.models.base import VoxelModel
-from scenenet.models.geneo_model import GeneoModel
-from scenenet.models.model_file import write_model
-from scenenet.models.settings import ModelSettings, TuningSettings
 from scenenet.pointcloud import PointCloud, class_scheme, survey_in_metres
 from scenenet.pointcloud.point_fields import PointField
 from scenenet.pointcloud.quality.screening import survey_warnings
 from scenenet.pointcloud.reading import same_points
 from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.pointcloud.ts40k import sample_files
-from scenenet.training.train import card_of, fit
-from scenenet.training.tuning import choose
-from scenenet.training.tuning_result import Tuning
 
 
 @dataclass(frozen=True)
@@ -71,6 +58,16 @@ class LabelledFiles:
     skipped: list[dict[str, str]] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     clouds: Mapping[str, PointCloud] = field(default_factory=dict)
+
+    @property
+    def validation(self) -> list[VoxelSample]:
+        """The crops kept to tune models on."""
+        return [s for s in self.dataset.samples if self.parts.get(s.id) == "validation"]
+
+    @property
+    def training(self) -> list[VoxelSample]:
+        """The other crops."""
+        return [s for s in self.dataset.samples if self.parts.get(s.id) != "validation"]
 
 
 def read_labelled(
@@ -261,112 +258,6 @@ def _surveys(
         true = None if truth is None else truth.of_sample(sample)
         of_truth = () if truth is None or true is None else (true, truth.towers_in(true))
         yield LabelledSurvey(sample, *facts, towers, own, True, *of_truth)
-
-
-def train_files(
-    paths: Sequence[Path],
-    codes: str,
-    grid: VoxelSettings,
-    settings: ModelSettings,
-    tuning: TuningSettings,
-    seeds: Sequence[int],
-    validation: float,
-    detection: DetectionSettings,
-    provenance: dict[str, Any],
-    out: str | Path,
-    failures: Failures,
-    squares: SquareSettings | None = None,
-) -> dict[str, Any]:
-    """Train with several seeds, tune each model on the validation crops, and write the best one.
-
-    Args:
-        validation: share of the crops for tuning. With 0 or a single crop, models are tuned on the
-            training crops. The scores are then too high, and ``tuned_on`` is ``training``.
-        detection: what makes a tower; the model whose towers are best is chosen.
-        squares: size of a crop for another target than towers; the default if None.
-
-    Returns:
-        the scores of each seed, the chosen seed, the parameters of the chosen model and whether
-        the crops determine them, the numbers of crops, the skipped files, and what looks wrong
-        about the files.
-
-    Raises:
-        InputError: no file has a point labelled with the target of the model.
-        typer.Exit: no file could be read.
-    """
-    target = settings.finds
-    split = SplitSettings(train=1 - validation, validation=validation, test=0, neighbour=0)
-    with scratch_folder() as scratch:
-        wanted = split if validation > 0 else None
-        files = read_labelled(
-            paths,
-            codes,
-            grid,
-            failures,
-            scratch,
-            wanted,
-            target=target,
-            squares=squares,
-            measurement=settings.measurement,
-        )
-        data = files.dataset
-        require_crops(files, paths, failures, target, codes)
-        kept = [s for s in data.samples if files.parts.get(s.id) == "validation"]
-        provenance = provenance | {"files": [path.name for path in files.read]}
-        training = [s for s in data.samples if files.parts.get(s.id) != "validation"]
-        tuned_on, others = (kept, training) if kept else (training, [])
-        candidates = []
-        for seed in seeds:
-            model, _ = fit(training, kept, settings, seed)
-            card = card_of(replace(data, samples=training), settings, grid, seed, provenance)
-            tuned, card, result = choose(model, card, tuned_on, tuning, others)
-            result = with_answer(result, tuned, card, tuned_on, files.clouds, detection)
-            candidates.append((seed, tuned, card, result))
-    seed, tuned, card, result = max(candidates, key=lambda entry: entry[3].decisive)
-    write_model(out, tuned, card)
-    return {
-        "model": str(out),
-        "target": target.name,
-        "seed": seed,
-        "tau": result.tau,
-        "kernel_size": list(result.kernel_size),
-        "tuned_on": "validation" if kept else "training",
-        "scores": asdict(result.validation),
-        "whole_towers": _plain(result.whole_towers),
-        "seeds": [_of_seed(number, found) for number, _, _, found in candidates],
-        "numbers": _numbers(tuned, [candidate for _, candidate, _, _ in candidates]),
-        "crops": {"training": len(training), "validation": len(kept)},
-        "skipped": files.skipped,
-        "warnings": files.warnings,
-    }
-
-
-def _of_seed(seed: int, found: Tuning) -> dict[str, Any]:
-    """What the tuning found for one seed."""
-    return {
-        "seed": seed,
-        "kernel_size": list(found.kernel_size),
-        **asdict(found.validation),
-        "whole_towers": _plain(found.whole_towers),
-    }
-
-
-def _plain(scores: VoxelScores | None) -> dict[str, Any] | None:
-    return None if scores is None else asdict(scores)
-
-
-def _numbers(chosen: VoxelModel, models: Sequence[VoxelModel]) -> list[dict[str, Any]]:
-    """The parameters of the chosen model, with what the models of all seeds say about each; none
-    for models in voxels."""
-    said = determination([model for model in models if isinstance(model, GeneoModel)])
-    if not said or not isinstance(chosen, GeneoModel):
-        return []
-    values = chosen.shape_parameters()
-    return [
-        {"name": p.name, "value": values[p.name], "unit": p.unit, **said[p.name]._asdict()}
-        for p in parameters_of(chosen, chosen.voxel_size or 1.0)
-        if p.name in said
-    ]
 
 
 def require_crops(

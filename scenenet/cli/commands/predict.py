@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from scenenet.clearance.settings import ClearanceSettings
+    from scenenet.prediction.result_files import PredictionFiles
     from scenenet.prediction.settings import PredictSettings
+    from scenenet.prediction.survey_files import SurveyFiles
     from scenenet.prediction.used_models import UsedModel
 
 EXAMPLES = (
@@ -173,12 +175,11 @@ def command(
     """
     from scenenet.core.code_hash import code_hash
     from scenenet.core.errors import InputError
-    from scenenet.core.outputs import check_outputs
     from scenenet.pointcloud.copc import require_pdal
     from scenenet.prediction import writers
-    from scenenet.prediction.result_files import PredictionFiles, require_space
+    from scenenet.prediction.result_files import PredictionFiles
     from scenenet.prediction.settings import PredictSettings
-    from scenenet.prediction.survey_files import SurveyFiles, look_at
+    from scenenet.prediction.survey_files import SurveyFiles
 
     settings = PredictSettings(
         voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
@@ -195,35 +196,48 @@ def command(
         model, towers, lines = _chosen(model, line, settings, scheme)
     if named and not lines:
         _refuse_without_lines({"--line": line, "--voltage": voltage, "--sags": sags})
-    files = {
+    results = {
         given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=lines)
         for given, survey in named.items()
     }
-    outputs = [output for each in files.values() for output in each.outputs()]
-    inputs = [path for survey in named.values() for path in (survey.given, *survey.files)]
-    check_outputs(outputs, [*inputs, *model], overwrite=overwrite)
-    seen = failures.look_at(named, lambda given: look_at(named[given])[0])
-    points = {g: {path: i.n_points for path, i in headers.items()} for g, headers in seen.items()}
-    require_space([(files[given], counts) for given, counts in points.items()], len(model))
+    ready = _ready(named, results, model, overwrite, failures)
     detection = detection_settings(min_conductor)
-    tiled = any(named[given].tiled for given in seen)
+    tiled = any(named[given].tiled for given in ready)
     code = code_hash([writers.__file__]) if tiled else None
     summaries = []
-    for given in seen:
+    for given in ready:
         with failures.collect():
             summary = writers.predict_to_files(
-                named[given], model, files[given], settings, detection, code, scheme, clearance
+                named[given], model, results[given], settings, detection, code, scheme, clearance
             )
             summaries.append(summary.to_json())
             for file in summary.files:
                 if file["error"]:
                     failures.errors.append(InputError(file["error"]))
-    show(
-        summaries,
-        as_json,
-        lambda all_: [_line(summary) for summary in all_],
-    )
+    show(summaries, as_json, lambda all_: [_line(summary) for summary in all_])
     failures.end()
+
+
+def _ready(
+    named: Mapping[Path, SurveyFiles],
+    results: Mapping[Path, PredictionFiles],
+    models: Sequence[Path],
+    overwrite: bool,
+    failures: Failures,
+) -> list[Path]:
+    """The surveys that can be predicted, after a look at their headers, at the files that would be
+    replaced and at the space on the disks."""
+    from scenenet.core.outputs import check_outputs
+    from scenenet.prediction.result_files import require_space
+    from scenenet.prediction.survey_files import look_at
+
+    outputs = [output for each in results.values() for output in each.outputs()]
+    inputs = [path for survey in named.values() for path in (survey.given, *survey.files)]
+    check_outputs(outputs, [*inputs, *models], overwrite=overwrite)
+    seen = failures.look_at(named, lambda given: look_at(named[given])[0])
+    points = {g: {path: i.n_points for path, i in headers.items()} for g, headers in seen.items()}
+    require_space([(results[given], counts) for given, counts in points.items()], len(models))
+    return list(seen)
 
 
 def _line(summary: dict[str, Any]) -> str:

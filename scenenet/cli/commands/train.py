@@ -207,7 +207,7 @@ def command(
         option = "--epochs" if learning_rate is None else "--learning-rate"
         raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None
     # After the options, so that a wrong one is named at once.
-    from scenenet.cli.labelled_files import train_files
+    from scenenet.cli.trained_files import train_files
     from scenenet.core.files import digest
     from scenenet.core.outputs import Output, check_outputs
     from scenenet.core.provenance import package_version

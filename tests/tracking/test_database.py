@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 
 import pytest
+from fixtures.forked import tracker
 
 from scenenet.core.errors import InputError
 from scenenet.tracking import database
@@ -30,16 +31,22 @@ CREATE = (
 CREATION_LIMIT_S = 300
 
 
+def create_in_another_process(folder: Path, *arguments: str) -> None:
+    """Create a store; ``arguments`` are its address, the file of the record and the request."""
+    code = (
+        "import sys; from scenenet.tracking.store import TrackingSettings, create_store;"
+        "create_store(TrackingSettings(uri=sys.argv[1]), sys.argv[2], request=sys.argv[3])"
+    )
+    made = tracker().call(code, arguments, folder, os.environ, CREATION_LIMIT_S)
+    assert made.returncode == 0, made.stderr
+
+
 @pytest.fixture(scope="module")
 def with_store(empty_database: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a store and its record, made in another process: MLflow keeps it open."""
     folder = tmp_path_factory.mktemp("store")
     shutil.copyfile(empty_database, folder / "mlflow.db")
-    code = (
-        "from scenenet.tracking.store import TrackingSettings, create_store;"
-        "create_store(TrackingSettings(uri='sqlite:///mlflow.db'), 'store.json')"
-    )
-    subprocess.run([sys.executable, "-c", code], cwd=folder, check=True)
+    create_in_another_process(folder, "sqlite:///mlflow.db", "store.json", "")
     return folder
 
 
@@ -250,12 +257,7 @@ def test_the_creation_is_requested_again_only_if_the_store_is_another(settings, 
     replaced = request_for(settings.uri, record)
     assert replaced not in (first, again)
     # In another process, as the next run of the workflow: MLflow keeps the first file open.
-    code = (
-        "import sys; from scenenet.tracking.store import TrackingSettings, create_store;"
-        "create_store(TrackingSettings(uri=sys.argv[1]), sys.argv[2], request=sys.argv[3])"
-    )
-    command = [sys.executable, "-c", code, settings.uri, str(record), replaced]
-    subprocess.run(command, check=True)
+    create_in_another_process(tmp_path, settings.uri, str(record), replaced)
     assert request_for(settings.uri, record) == replaced
 
 

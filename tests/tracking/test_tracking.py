@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import sqlite3
-import subprocess
-import sys
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mlflow
@@ -15,7 +14,8 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from fixtures.result_folder import with_observer, with_truth
+from fixtures.forked import tracker
+from fixtures.result_folder import results_in, with_observer, with_truth
 from mlflow import MlflowClient
 from mlflow.entities import ViewType
 
@@ -48,6 +48,41 @@ def client(settings: TrackingSettings) -> MlflowClient:
     return MlflowClient(tracking_uri=settings.uri)
 
 
+@dataclass(frozen=True)
+class Logged:
+    """Results and the store in which they are; tests only read them."""
+
+    client: MlflowClient
+    settings: TrackingSettings
+    results: Results
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def logged(empty_database: Path, made_results: Path, tmp_path_factory) -> Logged:
+    """The results of two models of two seeds and of the boosted trees, logged once."""
+    folder = tmp_path_factory.mktemp("logged")
+    shutil.copyfile(empty_database, folder / "mlflow.db")
+    settings = TrackingSettings(uri=f"sqlite:///{folder / 'mlflow.db'}")
+    create_store(settings, folder / "store.json")
+    shutil.copytree(made_results, folder / "results")
+    results = results_in(folder)
+    record = json.loads((results.folder / "evaluate" / "scenenet" / "seed-1.json").read_text())
+    box = results.folder / "boosted_trees" / "seed-1.json"
+    box.parent.mkdir()
+    box.write_text(json.dumps(record | {"model": BOOSTED_TREES}))
+    planned = [d for d in plan(results) if d.name == "kernels-cnn"]
+    pictures = draw_all(planned, folder / "figures")
+    log(settings, results, folder, pictures=pictures, protocol="20/10/70 by stretch")
+    return Logged(MlflowClient(tracking_uri=settings.uri), settings, results, folder)
+
+
+@pytest.fixture
+def one_model(results: Results) -> Results:
+    """The results of the CNN alone: half of the runs, where a test logs more than once."""
+    return replace(results, models={"cnn": "cnn"})
+
+
 def runs(client: MlflowClient, view: int = ViewType.ACTIVE_ONLY) -> dict[str, list]:
     """Runs by name."""
     experiment = client.get_experiment_by_name("scenenet")
@@ -57,13 +92,20 @@ def runs(client: MlflowClient, view: int = ViewType.ACTIVE_ONLY) -> dict[str, li
     return found
 
 
-def create_in_a_process_of_its_own(folder: Path, record: str) -> subprocess.Popen:
-    code = (
-        "import sys; from scenenet.tracking.store import TrackingSettings, create_store;"
-        "create_store(TrackingSettings(uri='sqlite:///mlflow.db'), sys.argv[1])"
-    )
-    command = [sys.executable, "-c", code, record]
-    return subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+CREATE = (
+    "import sys; from scenenet.tracking.store import TrackingSettings, create_store;"
+    "create_store(TrackingSettings(uri='sqlite:///mlflow.db'), sys.argv[1])"
+)
+CREATE_TWICE = """
+import os, sys
+from scenenet.tracking.store import TrackingSettings, create_store
+child = os.fork()
+create_store(TrackingSettings(uri="sqlite:///mlflow.db"), f"{int(child == 0)}.json")
+if child:
+    sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+"""Two processes create the store at the same time."""
+LIMIT_S = 600
 
 
 def log(settings: TrackingSettings, results: Results, tmp_path: Path, **more) -> dict[str, str]:
@@ -73,9 +115,8 @@ def log(settings: TrackingSettings, results: Results, tmp_path: Path, **more) ->
     return {key.split("/", 2)[2]: run["status"] for key, run in written["runs"].items()}
 
 
-def test_a_training_is_a_run_with_all_its_facts(settings, client, results, tmp_path):
-    log(settings, results, tmp_path, protocol="20/10/70 by stretch")
-    (run,) = runs(client)["scenenet seed 1"]
+def test_a_training_is_a_run_with_all_its_facts(logged):
+    (run,) = runs(logged.client)["scenenet seed 1"]
     assert run.info.status == "FINISHED"
     assert run.info.end_time - run.info.start_time == 8000
     assert run.data.params["training.epochs"] == "4"
@@ -102,17 +143,15 @@ def test_scores_against_the_truth_and_of_points_are_metrics(results):
     assert group.parent.metrics["truth_precision_mean"] == pytest.approx(0.175)
 
 
-def test_the_data_of_a_training_are_data_sets_with_their_fingerprint(
-    settings, client, results, tmp_path
-):
-    log(settings, results, tmp_path)
+def test_the_data_of_a_training_are_data_sets_with_their_fingerprint(logged):
+    client = logged.client
     (run,) = runs(client)["scenenet seed 1"]
     inputs = {one.tags[0].value: one.dataset for one in run.inputs.dataset_inputs}
     assert set(inputs) == {"training", "validation", "test"}
     assert {data.digest for data in inputs.values()} == {run.data.tags["scenenet.data"]}
     assert inputs["test"].name == "corridors, test"
     source = mlflow.data.get_source(inputs["test"])
-    assert source.uri == (results.folder / "split" / "split.csv").as_posix()
+    assert source.uri == (logged.results.folder / "split" / "split.csv").as_posix()
     assert json.loads(inputs["test"].profile) == {"crops": 3}
     model = client.get_logged_model(run.outputs.model_outputs[0].model_id)
     measured_on = {metric.key: metric.dataset_name for metric in model.metrics}
@@ -121,20 +160,18 @@ def test_the_data_of_a_training_are_data_sets_with_their_fingerprint(
     assert measured_on["tau"] is None
 
 
-def test_every_tuned_model_is_a_logged_model_with_signature_and_example(
-    settings, client, results, tmp_path
-):
-    log(settings, results, tmp_path)
+def test_every_tuned_model_is_a_logged_model_with_signature_and_example(logged):
+    client = logged.client
     experiment = client.get_experiment_by_name("scenenet").experiment_id
-    logged = {model.name: model for model in client.search_logged_models([experiment])}
-    assert set(logged) == {f"{m}-seed-{s}" for m in ("scenenet", "cnn") for s in (0, 1)}
-    model = logged["scenenet-seed-1"]
+    models = {model.name: model for model in client.search_logged_models([experiment])}
+    assert set(models) == {f"{m}-seed-{s}" for m in ("scenenet", "cnn") for s in (0, 1)}
+    model = models["scenenet-seed-1"]
     (run,) = runs(client)["scenenet seed 1"]
     assert model.source_run_id == run.info.run_id
     assert str(model.status) == "READY"
     assert model.params["training.epochs"] == "4"
     assert {m.key: m.value for m in model.metrics}["test_precision"] == pytest.approx(0.6)
-    mlflow.set_tracking_uri(settings.uri)
+    mlflow.set_tracking_uri(logged.settings.uri)
     info = mlflow.models.get_model_info(f"models:/{model.model_id}")
     assert info.signature.inputs.inputs[0].shape == (-1, -1, -1, -1)
     loaded = mlflow.pyfunc.load_model(f"models:/{model.model_id}")
@@ -142,26 +179,26 @@ def test_every_tuned_model_is_a_logged_model_with_signature_and_example(
     assert loaded.predict(example()).shape == example().shape
 
 
-def test_a_replaced_run_takes_its_logged_model_with_it(settings, client, results, tmp_path):
-    log(settings, results, tmp_path)
+def test_a_replaced_run_takes_its_logged_model_with_it(settings, client, one_model, tmp_path):
+    log(settings, one_model, tmp_path)
     (before,) = runs(client)["cnn seed 0"]
-    file = results.folder / "evaluate" / "cnn" / "seed-0.json"
+    file = one_model.folder / "evaluate" / "cnn" / "seed-0.json"
     changed = json.loads(file.read_text())
     changed["voxel"]["precision"] = 0.9
     file.write_text(json.dumps(changed))
-    log(settings, replace(results), tmp_path)
+    log(settings, replace(one_model), tmp_path)
     experiment = client.get_experiment_by_name("scenenet").experiment_id
     logged = [model.model_id for model in client.search_logged_models([experiment])]
-    assert len(logged) == 4
+    assert len(logged) == 2
     assert before.outputs.model_outputs[0].model_id not in logged
 
 
-def test_every_epoch_of_loss_and_parameters_is_there(settings, client, results, tmp_path):
-    log(settings, results, tmp_path)
+def test_every_epoch_of_loss_and_parameters_is_there(logged):
+    client = logged.client
     (run,) = runs(client)["scenenet seed 0"]
     history = client.get_metric_history(run.info.run_id, "loss")
     assert [(m.step, m.value) for m in history] == [(1, 1), (2, 0.5), (3, 1 / 3), (4, 0.25)]
-    history = results.seed("scenenet", 0).history
+    history = logged.results.seed("scenenet", 0).history
     names = parameter_columns(history)
     assert len(names) == 11 + 1  # the last weight is one minus the others
     for name in names:
@@ -179,9 +216,8 @@ def test_more_measures_than_mlflow_takes_at_once_are_all_logged(settings, client
     assert len(run.data.params) == 230
 
 
-def test_model_and_figures_are_artifacts_next_to_the_database(settings, client, results, tmp_path):
-    planned = [d for d in plan(results) if d.name == "kernels-cnn"]
-    log(settings, results, tmp_path, pictures=draw_all(planned, tmp_path / "figures"))
+def test_model_and_figures_are_artifacts_next_to_the_database(logged):
+    client = logged.client
     (run,) = runs(client)["scenenet seed 0"]
     paths = {
         a.path
@@ -194,14 +230,14 @@ def test_model_and_figures_are_artifacts_next_to_the_database(settings, client, 
     (parent,) = runs(client)["cnn (corridors)"]
     (picture,) = client.list_artifacts(parent.info.run_id, "figures")
     assert picture.path == "figures/kernels-cnn.png"
-    stored = tmp_path / "mlartifacts" / "scenenet" / run.info.run_id / "artifacts" / "model"
+    stored = logged.folder / "mlartifacts" / "scenenet" / run.info.run_id / "artifacts" / "model"
     assert (stored / "seed-0.json").read_bytes() == (
-        results.folder / "models" / "scenenet" / "seed-0.json"
+        logged.results.folder / "models" / "scenenet" / "seed-0.json"
     ).read_bytes()
 
 
-def test_a_parent_has_the_summary_of_the_runs_under_it(settings, client, results, tmp_path):
-    log(settings, results, tmp_path)
+def test_a_parent_has_the_summary_of_the_runs_under_it(logged):
+    client = logged.client
     (parent,) = runs(client)["cnn (corridors)"]
     metrics = parent.data.metrics
     assert metrics["alive_share"] == 0.5
@@ -215,12 +251,8 @@ def test_a_parent_has_the_summary_of_the_runs_under_it(settings, client, results
         assert child.data.tags["mlflow.parentRunId"] == parent.info.run_id
 
 
-def test_the_boosted_trees_have_runs_like_the_models(settings, client, results, tmp_path):
-    record = json.loads((results.folder / "evaluate" / "scenenet" / "seed-1.json").read_text())
-    box = results.folder / "boosted_trees" / "seed-1.json"
-    box.parent.mkdir()
-    box.write_text(json.dumps(record | {"model": BOOSTED_TREES}))
-    log(settings, results, tmp_path)
+def test_the_boosted_trees_have_runs_like_the_models(logged):
+    client = logged.client
     (parent,) = runs(client)["boosted trees (corridors)"]
     (seed,) = runs(client)["boosted trees seed 1"]
     assert seed.data.tags["mlflow.parentRunId"] == parent.info.run_id
@@ -239,12 +271,12 @@ def test_an_observer_has_a_run_whose_tag_says_what_it_finds(results):
     assert run.artifacts.keys() == {"model/wires.json"}
 
 
-def test_logging_again_keeps_every_run(settings, client, results, tmp_path):
-    assert set(log(settings, results, tmp_path).values()) == {"logged"}
+def test_logging_again_keeps_every_run(settings, client, one_model, tmp_path):
+    assert set(log(settings, one_model, tmp_path).values()) == {"logged"}
     before = {name: run[0].info.run_id for name, run in runs(client).items()}
-    assert set(log(settings, results, tmp_path).values()) == {"kept"}
+    assert set(log(settings, one_model, tmp_path).values()) == {"kept"}
     assert {name: run[0].info.run_id for name, run in runs(client).items()} == before
-    assert len(before) == 6
+    assert len(before) == 3
 
 
 def test_a_changed_result_replaces_its_run_and_its_parent_alone(
@@ -274,33 +306,33 @@ def test_a_seed_that_is_no_longer_configured_leaves_the_group(settings, client, 
     ]  # fmt: skip
 
 
-def test_other_data_and_runs_of_other_users_stay(settings, client, results, tmp_path):
+def test_other_data_and_runs_of_other_users_stay(settings, client, one_model, tmp_path):
     experiment = client.get_experiment_by_name("scenenet").experiment_id
     client.create_run(experiment, run_name="by hand")
-    log(settings, results, tmp_path)
-    log_runs(settings, model_groups(results, "ts40k"), tmp_path / "runs.json")
+    log(settings, one_model, tmp_path)
+    log_runs(settings, model_groups(one_model, "ts40k"), tmp_path / "runs.json")
     found = runs(client)
     assert len(found["by hand"]) == 1
-    assert len(found["scenenet seed 0"]) == 2
-    assert {"scenenet (corridors)", "scenenet (ts40k)"} <= set(found)
+    assert len(found["cnn seed 0"]) == 2
+    assert {"cnn (corridors)", "cnn (ts40k)"} <= set(found)
 
 
-def test_an_interrupted_run_is_logged_again(settings, client, results, tmp_path):
-    log(settings, results, tmp_path)
+def test_an_interrupted_run_is_logged_again(settings, client, one_model, tmp_path):
+    log(settings, one_model, tmp_path)
     (run,) = runs(client)["cnn seed 0"]
     client.delete_tag(run.info.run_id, "scenenet.digest")
-    assert log(settings, results, tmp_path)["cnn/seed-0"] == "logged"
+    assert log(settings, one_model, tmp_path)["cnn/seed-0"] == "logged"
     assert len(runs(client)["cnn seed 0"]) == 1
 
 
 def test_an_experiment_deleted_by_hand_is_restored_without_duplicates(
-    settings, client, results, tmp_path
+    settings, client, one_model, tmp_path
 ):
-    log(settings, results, tmp_path)
+    log(settings, one_model, tmp_path)
     client.delete_experiment(client.get_experiment_by_name("scenenet").experiment_id)
     create_store(settings, tmp_path / "store.json")
-    log(settings, results, tmp_path)
-    assert [len(same) for same in runs(client).values()] == [1] * 6
+    log(settings, one_model, tmp_path)
+    assert [len(same) for same in runs(client).values()] == [1] * 3
 
 
 def test_a_store_made_anew_has_another_id_and_the_old_record_is_refused(
@@ -313,7 +345,8 @@ def test_a_store_made_anew_has_another_id_and_the_old_record_is_refused(
     (tmp_path / "mlflow.db").unlink()
     shutil.copyfile(empty_database, tmp_path / "mlflow.db")
     # As a later run of the workflow does: MLflow keeps a deleted database open within a process.
-    assert create_in_a_process_of_its_own(tmp_path, "other.json").wait(120) == 0
+    made = tracker().call(CREATE, ["other.json"], tmp_path, os.environ, LIMIT_S)
+    assert made.returncode == 0, made.stderr
     assert store_id(settings.uri) not in (None, before)
     with pytest.raises(InputError, match=r"mlflow\.db: is not the MLflow store that .*store\.json"):
         log(settings, results, tmp_path)
@@ -332,10 +365,8 @@ def test_a_database_with_runs_of_others_is_kept(empty_database, tmp_path):
 
 
 def test_two_processes_may_make_the_store_at_once(tmp_path):
-    started = [create_in_a_process_of_its_own(tmp_path, f"{n}.json") for n in range(2)]
-    for process in started:
-        _, errors = process.communicate(timeout=600)
-        assert process.returncode == 0, errors
+    made = tracker().call(CREATE_TWICE, [], tmp_path, os.environ, LIMIT_S)
+    assert made.returncode == 0, made.stderr
     assert (tmp_path / "0.json").read_bytes() == (tmp_path / "1.json").read_bytes()
 
 
@@ -471,8 +502,8 @@ def test_the_best_seed_is_in_the_registry_and_predicts_a_batch_of_any_size(
         "np.save(sys.argv[2] + '/all.npy', model.predict(grids));"
         "np.save(sys.argv[2] + '/one.npy', model.predict(grids[2:]))"
     )
-    command = [sys.executable, "-c", code, settings.uri, str(tmp_path)]
-    subprocess.run(command, check=True, capture_output=True)
+    loaded = tracker().call(code, [settings.uri, str(tmp_path)], tmp_path, os.environ, LIMIT_S)
+    assert loaded.returncode == 0, loaded.stderr
     answer = np.load(tmp_path / "all.npy")
     assert answer.shape == grids.shape
     np.testing.assert_array_equal(np.load(tmp_path / "one.npy")[0], answer[2])

@@ -37,7 +37,7 @@ def scenenet(*arguments: object, cwd: Path | None = None) -> subprocess.Complete
 def survey(tmp_path_factory) -> Path:
     """A small synthetic corridor with few points."""
     out = tmp_path_factory.mktemp("survey") / "corridor.laz"
-    make_survey(SyntheticSettings(towers=4, seed=5, density=20), out)
+    make_survey(SyntheticSettings(towers=3, seed=5, density=20), out)
     return out
 
 
@@ -49,7 +49,7 @@ def model(survey, tmp_path_factory) -> Path:
                     "--seeds", 2, "--json")  # fmt: skip
     assert made.returncode == 0, made.stderr
     output = json.loads(made.stdout)
-    assert output["crops"] == {"training": 4, "validation": 0}
+    assert output["crops"] == {"training": 3, "validation": 0}
     assert output["tuned_on"] == "training"
     assert len(output["seeds"]) == 2
     assert "generations" in made.stderr
@@ -64,7 +64,7 @@ def test_the_thesis_protocol_can_be_selected(survey, tmp_path):
     made = scenenet("train", survey, "--codes", "edp", "--out", out, "--resolution", 32,
                     "--protocol", "thesis", "--epochs", 2, "--seeds", 1, "--json")  # fmt: skip
     assert made.returncode == 0, made.stderr
-    assert json.loads(made.stdout)["crops"] == {"training": 3, "validation": 1}
+    assert json.loads(made.stdout)["crops"] == {"training": 2, "validation": 1}
     assert json.loads(out.read_text())["units"] == "voxel"
 
 
@@ -136,7 +136,7 @@ def test_evaluate_prints_the_documented_scores(survey, model):
     assert set(scores["voxel"]) == {
         "precision", "recall", "f05", "iou_tower", "miou", "tau", "n_samples",
     }  # fmt: skip
-    assert scores["voxel"]["n_samples"] == len(scores["per_sample"]) == 4
+    assert scores["voxel"]["n_samples"] == len(scores["per_sample"]) == 3
     assert scores["voxel_trivial"]["f05"] == 0
     assert scores["voxel_trivial"]["miou"] == pytest.approx(0.5, abs=0.01)
     assert set(scores["towers"]) == {
@@ -149,7 +149,7 @@ def test_evaluate_at_the_models_voxel_size_detects_in_the_whole_survey(survey, m
     done = scenenet("evaluate", survey, "--model", model, "--codes", "edp", "--fit", "metric",
                     "--json")  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["towers"]["n_true"] == 4
+    assert json.loads(done.stdout)["towers"]["n_true"] == 3
 
 
 @pytest.mark.parametrize("command", ["predict", "evaluate", "explain"])
@@ -181,7 +181,7 @@ def test_explain_writes_a_page_that_needs_no_other_file(survey, model, tmp_path)
     assert text.count("data:image/png") == len(json.loads(done.stdout))
     footer = text[text.index("<footer>") : text.index("</footer>")]
     card = json.loads(model.read_text())
-    made_by = f"Model {card['name']}: protocol operational, seed {card['provenance']['seed']}, 4 "
+    made_by = f"Model {card['name']}: protocol operational, seed {card['provenance']['seed']}, 3 "
     assert made_by in footer
     assert "{" not in footer and "thesis (" not in footer
 

@@ -48,6 +48,12 @@ def toys(scene):
     ]
 
 
+@pytest.fixture(scope="module")
+def searched(toys):
+    """A model after a search, and its history."""
+    return fit(toys[:3], toys[3:], settings(15), 0)
+
+
 def assert_constrained(numbers: dict[str, float]) -> None:
     """Positive parameters and a convex combination (thesis 4.5)."""
     weights = [v for k, v in numbers.items() if k.startswith("lambda.")]
@@ -71,8 +77,8 @@ def test_the_constraints_hold_for_any_stored_numbers(raw):
     assert torch.isfinite(model.observer()[0]).all()
 
 
-def test_the_constraints_hold_at_every_step_and_in_the_saved_model(toys, tmp_path):
-    model, history = fit(toys[:3], toys[3:], settings(), 0)
+def test_the_constraints_hold_at_every_step_and_in_the_saved_model(searched, tmp_path):
+    model, history = searched
     shown = list(model.shape_parameters())
     for _, row in history.iterrows():
         assert_constrained(row[shown].to_dict())
@@ -81,8 +87,8 @@ def test_the_constraints_hold_at_every_step_and_in_the_saved_model(toys, tmp_pat
     assert_constrained(read_model(tmp_path / "m.json")[0].shape_parameters())
 
 
-def test_the_search_finds_the_poles_and_gets_no_worse(toys):
-    model, history = fit(toys[:3], toys[3:], settings(15), 0)
+def test_the_search_finds_the_poles_and_gets_no_worse(searched):
+    model, history = searched
     assert history["epoch"].tolist() == list(range(1, 16))
     assert (history["loss"].diff().iloc[1:-1] <= 0).all()
     assert history["loss"].iloc[-1] < 0.4
@@ -97,7 +103,7 @@ def test_no_initial_model_is_dead(toys, seed):
 
 
 def test_same_seed_same_numbers_and_other_seed_other_numbers(toys):
-    (a, one), (b, two), (c, _) = (fit(toys[:2], toys[3:], settings(3), s) for s in (1, 1, 2))
+    (a, one), (b, two), (c, _) = (fit(toys[:1], toys[3:], settings(3), s) for s in (1, 1, 2))
     assert a.numbers().tolist() == b.numbers().tolist()
     assert a.numbers().tolist() != c.numbers().tolist()
     pd.testing.assert_frame_equal(
@@ -110,7 +116,7 @@ class PowerCut(Exception):
 
 
 def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
-    straight, straight_history = fit(toys[:2], [], settings(5), 1)
+    straight, straight_history = fit(toys[:1], [], settings(5), 1)
     original, done = metric_search.advance, iter(range(2 * 2 + 1))  # trials and one more
 
     def interrupted(*args):
@@ -120,26 +126,25 @@ def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
 
     monkeypatch.setattr(metric_search, "advance", interrupted)
     with pytest.raises(PowerCut):
-        fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
+        fit(toys[:1], [], settings(5), 1, checkpoint=tmp_path / "c")
     monkeypatch.undo()
     monkeypatch.setattr(metric_search, "begin", None)  # a search that starts again fails
-    resumed, history = fit(toys[:2], [], settings(5), 1, checkpoint=tmp_path / "c")
+    resumed, history = fit(toys[:1], [], settings(5), 1, checkpoint=tmp_path / "c")
     assert resumed.numbers().tolist() == straight.numbers().tolist()
     pd.testing.assert_frame_equal(
         history.drop(columns="seconds"), straight_history.drop(columns="seconds"), check_exact=True
     )
 
 
-@pytest.mark.parametrize("what", ["another seed", "nothing but noise"])
-def test_a_checkpoint_of_something_else_is_ignored(toys, tmp_path, what):
-    checkpoint = tmp_path / "c"
-    fit(toys[:2], [], settings(2), 7, checkpoint=checkpoint)
-    if what == "nothing but noise":
-        checkpoint.write_bytes(checkpoint.read_bytes()[:40])
-    fresh, _ = fit(toys[:2], [], settings(2), 1)
-    model, history = fit(toys[:2], [], settings(2), 1, checkpoint=checkpoint)
-    assert len(history) == 2
-    assert model.numbers().tolist() == fresh.numbers().tolist()
+def test_a_checkpoint_of_something_else_is_ignored(toys, tmp_path):
+    another_seed, noise = tmp_path / "c", tmp_path / "noise"
+    fit(toys[:1], [], settings(2), 7, checkpoint=another_seed)
+    noise.write_bytes(another_seed.read_bytes()[:40])
+    fresh, _ = fit(toys[:1], [], settings(2), 1)
+    for checkpoint in (another_seed, noise):
+        model, history = fit(toys[:1], [], settings(2), 1, checkpoint=checkpoint)
+        assert len(history) == 2
+        assert model.numbers().tolist() == fresh.numbers().tolist()
 
 
 def test_half_the_voxel_size_covers_the_same_metres():
@@ -259,8 +264,8 @@ def test_a_model_in_metres_has_no_other_kernel_size():
         net().with_kernel_size((9, 9, 9))
 
 
-def test_tau_is_chosen_on_the_training_crops_as_well(toys):
-    model, _ = fit(toys[:3], [], settings(3), 0)
+def test_tau_is_chosen_on_the_training_crops_as_well(toys, searched):
+    model, _ = searched
     sizes = TuningSettings(kernel_sizes=((9, 5, 5),))
     _, card, result = choose(model, card_for(model), toys[3:], sizes, toys[:3])
     everything = threshold_curve(model, toys, "presence")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import os
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from fixtures.forked import command_line
 from sklearn.utils import compute_sample_weight
 
 from scenenet.baselines.quantile_bins import QuantileBins
@@ -24,6 +25,7 @@ from scenenet.experiments.domain_gap.compare_crops import (
 )
 from scenenet.synthetic import SyntheticSettings
 
+NAME = "scenenet.experiments.domain_gap."
 SPARSE = {"towers": 8, "density": 20.0, "tower_density": 20.0}
 
 
@@ -72,10 +74,9 @@ def test_a_folder_without_samples_is_refused(tmp_path):
 
 @pytest.mark.parametrize("module", ["compare_crops", "transfer"])
 def test_the_command_has_a_help_text(module):
-    shown = subprocess.run(
-        [sys.executable, "-m", f"scenenet.experiments.domain_gap.{module}", "--help"],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+    program = f"import runpy; runpy.run_module({NAME + module!r}, run_name='__main__')"
+    shown = command_line().call(program, ["--help"], Path.cwd(), os.environ, 600)
+    assert shown.returncode == 0, shown.stderr
     assert "--real" in shown.stdout
 
 

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 CELL_M = 1.0
 """m, edge of the cells in plan that are joined to places."""
@@ -24,6 +21,10 @@ def places(xyz: np.ndarray, kind: np.ndarray) -> Iterator[np.ndarray]:
         xyz: (n, 3) m, of the points.
         kind: (n,) integers.
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
     for number in np.unique(kind):
         rows = np.flatnonzero(kind == number)
         cells, cell = np.unique(np.floor(xyz[rows, :2] / CELL_M), axis=0, return_inverse=True)

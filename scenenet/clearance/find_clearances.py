@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from scenenet.clearance import danger
 from scenenet.clearance.crossings import Crossing, crossings
@@ -244,6 +243,8 @@ def _keep(
 
 def _once(trees: list[FallTree]) -> list[FallTree]:
     """The trees, worst first; one that neighbouring spans or sections have stays with the worse."""
+    from scipy.spatial import cKDTree
+
     trees = sorted(trees, key=lambda tree: (tree.margin, tree.x, tree.y))
     if not trees:
         return trees

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+
+from scenenet.clearance.gaussian import gaussian_at
 
 CELL_M = 1.0
 """m, edge of the cells."""
@@ -26,6 +27,9 @@ PIT_M = 2.0
 SMOOTHED = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 """Cells, widths over which gaps in the ground are filled from what is around them; the first that
 reaches ground counts."""
+
+REACHED = 0.02
+"""Share of the weight of a Gaussian that known cells have, from which it reaches them."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,8 @@ class GroundModel:
         return self._read(self.steepness, xy)
 
     def _read(self, raster: np.ndarray, xy: np.ndarray) -> np.ndarray:
+        from scipy import ndimage
+
         at = ((xy - self.corner) / CELL_M).T[::-1]
         return np.asarray(ndimage.map_coordinates(raster, at, order=1, mode="nearest"))
 
@@ -65,7 +71,8 @@ class GroundModel:
         count = np.bincount(flat, minlength=shape[0] * shape[1]).reshape(shape)
         total = np.bincount(flat, weights=xyz[:, 2], minlength=count.size).reshape(shape)
         known = count > 0
-        return cls._of(corner, np.where(known, total / np.maximum(count, 1), 0.0), known)
+        gaps = _Gaps.of(known)
+        return cls._of(corner, gaps.filled(np.where(known, total / np.maximum(count, 1), 0.0)))
 
     @classmethod
     def from_points(cls, xyz: np.ndarray, box: np.ndarray) -> GroundModel:
@@ -75,6 +82,8 @@ class GroundModel:
         Args:
             box: as ``from_ground``.
         """
+        from scipy import ndimage
+
         corner, shape, flat = _cells(xyz, box)
         lowest, place = np.full(shape[0] * shape[1], np.inf), np.zeros((shape[0] * shape[1], 2))
         np.minimum.at(lowest, flat, xyz[:, 2])
@@ -89,33 +98,63 @@ class GroundModel:
         surface = np.where(pits, closed, surface)
         ground = _opened(surface, seen & ~pits, SLOPE)
         # Without its slope the ground is nearly level, so that low and wide bushes stand out.
-        trend = ndimage.gaussian_filter(cls._of(corner, surface, ground).z, TREND)
+        trend = ndimage.gaussian_filter(_Gaps.of(ground).filled(surface), TREND)
         ground = _opened(surface - trend, ground, REST_SLOPE)
-        model = cls._of(corner, surface, ground)
+        gaps = _Gaps.of(ground)
+        model = cls._of(corner, gaps.filled(surface))
         # On a slope the lowest point of a cell lies at its lower side, not in its centre.
         lower = model.height(place).reshape(shape)
-        return cls._of(corner, surface + np.where(ground, model.z - lower, 0.0), ground)
+        return cls._of(corner, gaps.filled(surface + np.where(ground, model.z - lower, 0.0)))
 
     @classmethod
-    def _of(cls, corner: np.ndarray, z: np.ndarray, known: np.ndarray) -> GroundModel:
-        """With the elevation of cells that are not ``known`` from those around them."""
-        rows, columns = np.nonzero(known)
+    def _of(cls, corner: np.ndarray, z: np.ndarray) -> GroundModel:
+        """From the elevation of every cell."""
+        from scipy import ndimage
+
+        north, east = np.gradient(ndimage.gaussian_filter(z, 1.0), CELL_M)
+        return cls(corner, z, np.hypot(north, east))
+
+
+@dataclass(frozen=True)
+class _Gaps:
+    """The cells of a raster whose values are not known, and what they are filled from.
+
+    Attributes:
+        known: (rows, columns) bool.
+        filled_from: width of a Gaussian, cells that it reaches with this and no smaller one, row
+            and column (n,) of each, and the share (n,) of its weight that known cells have there.
+    """
+
+    known: np.ndarray
+    filled_from: tuple[tuple[float, tuple[np.ndarray, np.ndarray], np.ndarray], ...]
+
+    @classmethod
+    def of(cls, known: np.ndarray) -> _Gaps:
+        """Those of a raster with some cells ``known``, at least one."""
+        weight, left = known.astype(float), np.nonzero(~known)
+        found = []
+        for width in SMOOTHED:
+            if not len(left[0]):
+                break
+            near = gaussian_at(weight, width, left)
+            reached = near > REACHED
+            found.append((width, (left[0][reached], left[1][reached]), near[reached]))
+            left = left[0][~reached], left[1][~reached]
+        return cls(known, tuple(found))
+
+    def filled(self, z: np.ndarray) -> np.ndarray:
+        """Elevations (rows, columns), m, with those of cells that are not known from those around
+        them."""
+        rows, columns = np.nonzero(self.known)
         design = np.column_stack((rows, columns, np.ones(len(rows))))
-        plane, *_ = np.linalg.lstsq(design, z[known], rcond=None)
+        plane, *_ = np.linalg.lstsq(design, z[self.known], rcond=None)
         tilt = plane[0] * np.arange(z.shape[0])[:, None] + plane[1] * np.arange(z.shape[1])
         tilt += plane[2]
-        rest, weight = np.where(known, z - tilt, 0.0), known.astype(float)
-        filled, left = rest.copy(), ~known
-        for width in SMOOTHED:
-            if not left.any():
-                break
-            near = ndimage.gaussian_filter(weight, width, mode="constant")
-            mean = ndimage.gaussian_filter(rest, width, mode="constant") / np.maximum(near, 1e-12)
-            reached = left & (near > 0.02)
-            filled[reached] = mean[reached]
-            left &= ~reached
-        north, east = np.gradient(ndimage.gaussian_filter(filled + tilt, 1.0), CELL_M)
-        return cls(corner, filled + tilt, np.hypot(north, east))
+        rest = np.where(self.known, z - tilt, 0.0)
+        filled = rest.copy()
+        for width, cells, near in self.filled_from:
+            filled[cells] = gaussian_at(rest, width, cells) / near
+        return filled + tilt
 
 
 def _opened(surface: np.ndarray, ground: np.ndarray, slope: float) -> np.ndarray:
@@ -124,6 +163,8 @@ def _opened(surface: np.ndarray, ground: np.ndarray, slope: float) -> np.ndarray
     Args:
         slope: share of the radius of an opening that ground may rise over it.
     """
+    from scipy import ndimage
+
     left, last = ground, surface
     for radius in OPENINGS:
         opened = ndimage.grey_opening(last, size=2 * radius + 1)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
+from functools import cached_property
 
+import numba
 import numpy as np
 
 from scenenet.clearance.ground_model import GroundModel
+from scenenet.core.compilation import EXACT
 from scenenet.pointcloud.class_schemes import ClassScheme, Role
 
 NO_OBSTACLE, ON_GROUND, PLANT, HOUSE = -1, 0, 1, 2
@@ -47,15 +49,20 @@ class Surroundings:
         xyz: (n, 3) m.
         kind: (n,) int8, number of the kind, or ``NO_OBSTACLE``.
         height: (n,) m above the ground.
-        lone: (n,) bool, which have few of their kind around them.
         ground: below them.
+        few: a point with fewer of its kind around it, itself among them, is a lone one.
     """
 
     xyz: np.ndarray
     kind: np.ndarray
     height: np.ndarray
-    lone: np.ndarray
     ground: GroundModel
+    few: int
+
+    @cached_property
+    def lone(self) -> np.ndarray:
+        """(n,) bool, which have few of their kind around them."""
+        return lone_points(self.xyz, self.kind, self.few)
 
 
 KIND_OF_ROLE: Mapping[Role, int] = {
@@ -89,7 +96,7 @@ def surroundings(
     Args:
         codes: (n,) uint8 class codes; None where only the heights decide.
         scheme: of the codes.
-        few: a point with fewer of its kind around it, itself among them, is a lone one.
+        few: of ``Surroundings``.
     """
     known = np.full(len(xyz), BY_HEIGHT, np.int8)
     if scheme is not None and codes is not None:
@@ -98,7 +105,7 @@ def surroundings(
         xyz, known = xyz[kept], known[kept]
     if not len(xyz):
         flat = GroundModel(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)))
-        return Surroundings(xyz, known, np.empty(0), np.empty(0, bool), flat)
+        return Surroundings(xyz, known, np.empty(0), flat, few)
     box = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
     on_ground = known == ON_GROUND
     if on_ground.sum() >= MIN_GROUND:
@@ -110,7 +117,7 @@ def surroundings(
     by_height = np.where(height <= band, ON_GROUND, PLANT)
     by_height[(height < -BELOW_M) | _in_the_air(xyz[:, :2], height)] = NO_OBSTACLE
     kind = np.where(known == BY_HEIGHT, by_height, known).astype(np.int8)
-    return Surroundings(xyz, kind, height, lone_points(xyz, kind, few), ground)
+    return Surroundings(xyz, kind, height, ground, few)
 
 
 def _in_the_air(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
@@ -153,12 +160,34 @@ def lone_points(xyz: np.ndarray, kind: np.ndarray, few: int) -> np.ndarray:
         size = at.max(axis=0) + 2
         flat = (at[:, 0] * size[1] + at[:, 1]) * size[2] + at[:, 2]
         cubes, cube, count = np.unique(flat, return_inverse=True, return_counts=True)
-        around = np.zeros(len(cubes), np.int64)
-        for x, y, z in product((-1, 0, 1), repeat=3):
-            other = cubes + (x * size[1] + y) * size[2] + z
-            found = np.minimum(np.searchsorted(cubes, other), len(cubes) - 1)
-            around += np.where(cubes[found] == other, count[found], 0)
-        few_around = around[cube] < few
+        few_around = _around(cubes, count, size[1], size[2])[cube] < few
         if few_around.mean() <= SPARSE:
             lone[rows] = few_around
     return lone
+
+
+@numba.njit(**EXACT)
+def _around(cubes, count, columns, levels):  # pragma: no cover - compiled
+    """Number of points in each cube and the 26 around it.
+
+    Args:
+        cubes: (C,) flat numbers of the cubes that have points, ascending.
+        count: (C,) points in each.
+        columns, levels: cubes along y and z, with an empty one at each end.
+    """
+    total = np.zeros(len(cubes), np.int64)
+    for x in range(-1, 2):
+        for y in range(-1, 2):
+            # Those of the next column follow one another, as the cubes do: two ends move along.
+            first = past = 0
+            within = np.int64(0)
+            for i in range(len(cubes)):
+                other = cubes[i] + (x * columns + y) * levels
+                while past < len(cubes) and cubes[past] <= other + 1:
+                    within += count[past]
+                    past += 1
+                while first < past and cubes[first] < other - 1:
+                    within -= count[first]
+                    first += 1
+                total[i] += within
+    return total

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from scenenet.clearance.kinds import PLANT, Surroundings
 
@@ -43,6 +41,9 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
     Tops are local maxima of the canopy; a lower one within the crown of a higher one is a part of
     it.
     """
+    from scipy import ndimage
+    from scipy.spatial import cKDTree
+
     joined = (around.kind == PLANT) & ~around.lone
     rows = np.flatnonzero(joined & (around.height >= min_height / 2))
     none = Trees(np.empty((0, 3)), np.empty(0))

@@ -107,10 +107,12 @@ def _axis(places: np.ndarray) -> SpanFrame | None:
         direction = np.array([np.cos(angle), np.sin(angle)])
         east, north = (places - middle).T
         t = north * direction[0] - east * direction[1]
-        lanes, counts = np.unique(np.floor(t / 3.0), return_counts=True)
+        lanes = np.floor(t / 3.0)
+        first = lanes.min()
+        counts = np.bincount((lanes - first).astype(np.int64))
         if counts.max() > most:
             most = int(counts.max())
-            best = direction, (lanes[np.argmax(counts)] + 0.5) * 3.0
+            best = direction, (first + np.argmax(counts) + 0.5) * 3.0
     assert best is not None
     direction, across = best
     east, north = (places - middle).T

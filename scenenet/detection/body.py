@@ -11,6 +11,7 @@ import numba
 import numpy as np
 
 from scenenet.core.compilation import EXACT
+from scenenet.detection.within import within
 
 SLIM = 1 / 8
 """Largest half width of a body as a share of its height; legs may be twice as wide."""
@@ -94,22 +95,26 @@ def _measured(
     x, y, z, east, north, elevations, foot_radius, voxel_size
 ):  # pragma: no cover - compiled
     """Base, height and upright of ``Body``."""
-    distance = np.hypot(x - east, y - north)
     lowest_seen = elevations.min()
-    near_foot = np.append(z[distance <= foot_radius], lowest_seen)
+    near = np.empty(len(z) + 1)
+    near[0], n = lowest_seen, 1
+    for i in range(len(z)):
+        near[n] = z[i]
+        n += within(x[i] - east, y[i] - north, foot_radius)
     # A percentile, because a single return below the ground would make a bush as tall as a tower.
-    lowest = _percentile(near_foot, LOWEST / 100)
+    lowest = _percentile(near[:n], LOWEST / 100)
     detected = np.unique(np.rint((elevations - lowest_seen) / voxel_size).astype(np.int64))
     middle = int((np.median(elevations) - lowest_seen) / voxel_size)
     head = _unbroken(detected, middle, STRAY_GAP / voxel_size)
     height = lowest_seen + head * voxel_size - lowest
     slim = max(SLIM_M, SLIM * height)
-    near = np.empty(len(z), np.bool_)
+    n = 0
     for i in range(len(z)):
         leg = z[i] - lowest < MIDDLE[0] * height
-        near[i] = distance[i] <= (2 * slim if leg else slim)
+        near[n] = z[i]
+        n += within(x[i] - east, y[i] - north, 2 * slim if leg else slim)
     # Levels count from the lowest detected voxel, which is on the lattice.
-    levels = np.unique(np.rint((z[near] - lowest_seen) / voxel_size).astype(np.int64))
+    levels = np.unique(np.rint((near[:n] - lowest_seen) / voxel_size).astype(np.int64))
     foot = int(np.rint((lowest - lowest_seen) / voxel_size))
     seen = np.unique(np.concatenate((levels, detected[detected <= head])))
     top = _unbroken(seen, middle, TOP_GAP / voxel_size)
@@ -150,7 +155,7 @@ def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cove
     n = 0
     for i in range(len(x)):
         px, py, pz = x[i] - east, y[i] - north, z[i] - base
-        if MIDDLE[0] * height <= pz <= MIDDLE[1] * height and np.hypot(px, py) <= 4 * slim:
+        if MIDDLE[0] * height <= pz <= MIDDLE[1] * height and within(px, py, 4 * slim):
             places[n] = px, py, pz
             n += 1
     if n == 0:
@@ -161,7 +166,7 @@ def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cove
     for multiple in SEARCH_RADII:
         reached = np.zeros(n_pieces, np.bool_)
         for i in range(n):
-            if np.hypot(places[i, 0] - at_east, places[i, 1] - at_north) <= multiple * slim:
+            if within(places[i, 0] - at_east, places[i, 1] - at_north, multiple * slim):
                 reached[piece[i]] = True
         if not reached.any():
             continue

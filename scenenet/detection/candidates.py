@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
+import numba
 import numpy as np
 
+from scenenet.core.compilation import EXACT
 from scenenet.detection.settings import DetectionSettings
 
 SURROUNDINGS_M = 28.0
@@ -29,29 +31,29 @@ class DetectedVoxels:
         from scipy.spatial import cKDTree
 
         self.centres, self.probability, self.voxel_size = centres, probability, voxel_size
+        self._weight = probability.astype(float)
+        self._weighted = centres[:, :2] * self._weight[:, None]
         self.columns, column_of = np.unique(centres[:, :2], axis=0, return_inverse=True)
         column_of = column_of.reshape(-1)
         self._by_column = np.argsort(column_of, kind="stable")
         self._starts = np.append(0, np.cumsum(np.bincount(column_of)))
         self._tree = cKDTree(self.columns)
 
-    def columns_within(self, place: np.ndarray, radius: float) -> list[int]:
-        """Columns within a planar radius in m of a position (2,) m."""
-        return self._tree.query_ball_point(place, radius)
+    def columns_within(self, place: np.ndarray, radius: float) -> np.ndarray:
+        """Columns (C,) within a planar radius in m of a position (2,) m."""
+        return np.array(self._tree.query_ball_point(place, radius), np.int64)
 
     def within(self, place: np.ndarray, radius: float) -> np.ndarray:
         """Voxels within a planar radius in m of a position (2,) m."""
         return self._in_columns(self.columns_within(place, radius))
 
-    def _in_columns(self, columns: Sequence[int]) -> np.ndarray:
+    def _in_columns(self, columns: np.ndarray) -> np.ndarray:
         """Voxels in these columns, column by column."""
-        members = [self._by_column[self._starts[c] : self._starts[c + 1]] for c in sorted(columns)]
-        return np.concatenate([*members, np.empty(0, np.int64)])
+        return _members(self._by_column, self._starts, np.sort(columns))
 
     def mean(self, voxels: np.ndarray) -> np.ndarray:
         """(2,) m, mean position of voxels, weighted by their probabilities."""
-        weight = self.probability[voxels].astype(float)
-        return (self.centres[voxels, :2] * weight[:, None]).sum(axis=0) / weight.sum()
+        return self._weighted[voxels].sum(axis=0) / self._weight[voxels].sum()
 
     def tallest_first(self) -> np.ndarray:
         """Columns by their number of detected levels, neighbouring columns included, highest
@@ -60,10 +62,25 @@ class DetectedVoxels:
         adjacent = self._tree.query_ball_point(self.columns, 1.5 * self.voxel_size)
         levels, total = np.empty(len(self.columns)), np.empty(len(self.columns))
         for column, neighbours in enumerate(adjacent):
-            near = self._in_columns(neighbours)
-            levels[column] = len(set(level[near].tolist()))
+            near = self._in_columns(np.array(neighbours, np.int64))
+            levels[column] = np.count_nonzero(np.diff(np.sort(level[near]))) + 1
             total[column] = self.probability[near].sum()
         return np.lexsort((self.columns[:, 1], self.columns[:, 0], -total, -levels))
+
+
+@numba.njit(**EXACT)
+def _members(by_column, starts, columns):  # pragma: no cover - compiled
+    """Voxels of columns (C,), one after another."""
+    n = 0
+    for column in columns:
+        n += starts[column + 1] - starts[column]
+    members = np.empty(n, np.int64)
+    n = 0
+    for column in columns:
+        for i in range(starts[column], starts[column + 1]):
+            members[n] = by_column[i]
+            n += 1
+    return members
 
 
 class DistinctPlaces:

@@ -18,6 +18,7 @@ from scenenet.detection.conductor_rules import (
     TESTED_CELL_M,
 )
 from scenenet.detection.surroundings import Surroundings
+from scenenet.detection.within import within
 
 BLOCK_M, BLOCKS_KEPT = 32.0, 256
 """m, edge of the blocks in which points on conductors are looked for, and number in memory."""
@@ -101,7 +102,7 @@ def _within(xyz, x, y, radius):  # pragma: no cover - compiled
     rows, n = np.empty(len(xyz), np.int64), 0
     for i in range(len(xyz)):
         rows[n] = i
-        n += np.hypot(xyz[i, 0] - x, xyz[i, 1] - y) <= radius
+        n += within(xyz[i, 0] - x, xyz[i, 1] - y, radius)
     return rows[:n]
 
 

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 
 from scenenet.core.compilation import EXACT
+from scenenet.detection.within import within
 from scenenet.prediction.work.tiling import EDGE, TileSpool
 
 KEPT_TILES = 64
@@ -22,9 +23,6 @@ KEPT_POINTS = 9
 KEPT_IN_ALL = 2_000_000
 """Positions kept in memory, in more tiles where they are small: 80 MB. On a slope, more tiles than
 ``KEPT_POINTS`` are around a tower."""
-
-ROUNDING_M = 1e-3
-"""More than a distance in metres is rounded by."""
 
 
 @dataclass(frozen=True)
@@ -54,13 +52,9 @@ class _Positions:
 def _around(x, y, z, east, north, radius):  # pragma: no cover - compiled
     """(3, m) m, the positions (n,) within a planar radius of a place, in their order."""
     rows, n = np.empty(len(x), np.int64), 0
-    # Squares are rounded, so the distance itself decides at the border.
-    near, far = max(radius - ROUNDING_M, 0.0) ** 2, (radius + ROUNDING_M) ** 2
     for i in range(len(x)):
-        dx, dy = x[i] - east, y[i] - north
-        squared = dx * dx + dy * dy
         rows[n] = i
-        n += squared <= near or (squared <= far and np.hypot(dx, dy) <= radius)
+        n += within(x[i] - east, y[i] - north, radius)
     found = np.empty((3, n))
     for k in range(n):
         i = rows[k]

@@ -67,8 +67,10 @@ def find_towers(
     measurement = _Measurement(surroundings, points, conductors, offset, voxel_size, tau, settings)
     found: list[MeasuredTower] = []
     places = range(len(rough)) if progress is None else track(range(len(rough)), progress)
+    for coming in rough[: AHEAD - 1]:
+        measurement.expect(coming)
     for i in places:
-        for coming in rough[i : i + AHEAD]:
+        for coming in rough[i + AHEAD - 1 : i + AHEAD]:
             measurement.expect(coming)
         found += measurement.towers_near(rough[i])
     towers = distinct_towers([tower.moved(offset) for tower in found], points)

@@ -36,6 +36,9 @@ RING_M, CROWDED = 0.95, 0.5
 """m, radius of the ring around a wire, and points in it for each point of the wire from which the
 wire is not in free air. Evenly spread points have 1.5."""
 
+ROUNDING_M = 1e-6
+"""m, added where points are left out because they cannot matter."""
+
 MIN_COVERED = 0.3
 """Share of the windows between the ends of a wire that have a piece of it, at least."""
 
@@ -216,21 +219,24 @@ def _near(pieces: Pieces, catenary: Catenary, beyond: float) -> np.ndarray:
 def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float) -> Wire | None:
     """The wire with all its points and its true ends, or None if too little of it is seen."""
     catenary = fit.catenary
-    along, _ = catenary.along(stz)
-    distance = np.hypot(*catenary.residuals(stz))
-    on = free & (distance <= IN_BUNDLE_M)
+    along, left = catenary.along(stz)
+    # Most points are further to its side than the ring, whatever their height.
+    beside = np.abs(left - catenary.left(along)) <= RING_M + ROUNDING_M
+    near = np.flatnonzero(free & beside)
+    along, distance = along[near], np.hypot(*catenary.residuals(stz[near]))
+    on = distance <= IN_BUNDLE_M
     if not on.any():
         return None
-    beside = free & (distance > IN_BUNDLE_M) & (distance <= RING_M)
+    beside = (distance > IN_BUNDLE_M) & (distance <= RING_M)
     seen = _clear_stretch(along[on], along[beside], window)
     if seen is None:
         return None
     low, high, covered = seen
     if high - low < 2 * window or covered < MIN_COVERED:
         return None
-    rows = np.flatnonzero(on & (along >= low) & (along <= high))
-    ends = catenary.between(along[rows].min(), along[rows].max())
-    return _bundled(stz, rows, ends, fit, covered)
+    part = on & (along >= low) & (along <= high)
+    ends = catenary.between(along[part].min(), along[part].max())
+    return _bundled(stz, near[part], ends, fit, covered)
 
 
 def _clear_stretch(

@@ -38,7 +38,8 @@ class WireVoxels:
         codes, voxels = self._lattice.locate(xyz)
         for code, rows in groups(codes):
             if code in self._sure:
-                inside[rows] = np.isin(voxels[rows], self._sure[code])
+                sure, own = self._sure[code], voxels[rows]
+                inside[rows] = sure[np.minimum(np.searchsorted(sure, own), len(sure) - 1)] == own
         return inside
 
 

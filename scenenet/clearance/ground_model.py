@@ -131,15 +131,16 @@ class _Gaps:
     @classmethod
     def of(cls, known: np.ndarray) -> _Gaps:
         """Those of a raster with some cells ``known``, at least one."""
-        weight, left = known.astype(float), np.nonzero(~known)
+        weight = known.astype(float)
+        rows, columns = np.nonzero(~known)
         found = []
         for width in SMOOTHED:
-            if not len(left[0]):
+            if not len(rows):
                 break
-            near = gaussian_at(weight, width, left)
+            near = gaussian_at(weight, width, (rows, columns))
             reached = near > REACHED
-            found.append((width, (left[0][reached], left[1][reached]), near[reached]))
-            left = left[0][~reached], left[1][~reached]
+            found.append((width, (rows[reached], columns[reached]), near[reached]))
+            rows, columns = rows[~reached], columns[~reached]
         return cls(known, tuple(found))
 
     def filled(self, z: np.ndarray) -> np.ndarray:

@@ -234,6 +234,7 @@ def send_points(job: Mapping[str, Any], out: BinaryIO) -> None:
 
 def main() -> int:
     job = json.loads(sys.argv[1])
+    sys.path.append(job["library"])
     # If the parent has ended, writing ends this process without a message.
     signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     signal.signal(signal.SIGALRM, signal.SIG_DFL)

@@ -4,6 +4,7 @@ file."""
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import selectors
@@ -13,6 +14,7 @@ import sys
 import tempfile
 from base64 import b64encode
 from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,7 @@ def _job(
     las = header.las
     return {
         "path": str(header.path.resolve()),
+        "library": _library(),
         "record": b64encode(las.vlrs.get("LasZipVlr")[0].record_data).decode(),
         "offset": las.offset_to_point_data,
         "points": las.point_count,
@@ -58,9 +61,20 @@ def _job(
 
 
 def _command(job: dict) -> list[str]:
-    # The file, not the module: importing the package would take a second. -P keeps the folder of
-    # the file off the import path.
-    return [sys.executable, "-P", str(Path(decoder.__file__)), json.dumps(job)]
+    # The file, not the module: importing the package would take a second. Without -S, the start
+    # files of an environment take as long as the rest of the start. -I keeps the folder of the file
+    # off the import path.
+    return [sys.executable, "-I", "-S", str(Path(decoder.__file__)), json.dumps(job)]
+
+
+@cache
+def _library() -> str:
+    """The folder from which the worker imports lazrs; empty where it is missing."""
+    found = importlib.util.find_spec("lazrs")
+    if found is None or found.origin is None:
+        return ""
+    file = Path(found.origin)
+    return str(file.parents[1] if found.submodule_search_locations else file.parent)
 
 
 def decompress(

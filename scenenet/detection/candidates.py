@@ -40,16 +40,18 @@ class DetectedVoxels:
         self._tree = cKDTree(self.columns)
 
     def columns_within(self, place: np.ndarray, radius: float) -> np.ndarray:
-        """Columns (C,) within a planar radius in m of a position (2,) m."""
-        return np.array(self._tree.query_ball_point(place, radius), np.int64)
+        """Columns (C,) within a planar radius in m of a position (2,) m, ascending."""
+        columns = np.array(self._tree.query_ball_point(place, radius), np.int64)
+        columns.sort()
+        return columns
 
     def within(self, place: np.ndarray, radius: float) -> np.ndarray:
         """Voxels within a planar radius in m of a position (2,) m."""
         return self._in_columns(self.columns_within(place, radius))
 
     def _in_columns(self, columns: np.ndarray) -> np.ndarray:
-        """Voxels in these columns, column by column."""
-        return _members(self._by_column, self._starts, np.sort(columns))
+        """Voxels in these columns, which ascend, column by column."""
+        return _members(self._by_column, self._starts, columns)
 
     def mean(self, voxels: np.ndarray) -> np.ndarray:
         """(2,) m, mean position of voxels, weighted by their probabilities."""
@@ -59,11 +61,12 @@ class DetectedVoxels:
         """Columns by their number of detected levels, neighbouring columns included, highest
         first."""
         level = np.rint(self.centres[:, 2] / self.voxel_size).astype(int)
-        adjacent = self._tree.query_ball_point(self.columns, 1.5 * self.voxel_size)
+        reach = 1.5 * self.voxel_size
+        adjacent = self._tree.query_ball_point(self.columns, reach, return_sorted=True)
         levels, total = np.empty(len(self.columns)), np.empty(len(self.columns))
         for column, neighbours in enumerate(adjacent):
             near = self._in_columns(np.array(neighbours, np.int64))
-            levels[column] = np.count_nonzero(np.diff(np.sort(level[near]))) + 1
+            levels[column] = _n_distinct(level[near])
             total[column] = self.probability[near].sum()
         return np.lexsort((self.columns[:, 1], self.columns[:, 0], -total, -levels))
 
@@ -81,6 +84,22 @@ def _members(by_column, starts, columns):  # pragma: no cover - compiled
             members[n] = by_column[i]
             n += 1
     return members
+
+
+@numba.njit(**EXACT)
+def _n_distinct(values):  # pragma: no cover - compiled
+    """Number of distinct values (n,), which are few: they are sorted by insertion, in place."""
+    n = 0
+    for value in values:
+        at = n
+        while at > 0 and values[at - 1] > value:
+            at -= 1
+        if at == 0 or values[at - 1] != value:
+            for i in range(n, at, -1):
+                values[i] = values[i - 1]
+            values[at] = value
+            n += 1
+    return n
 
 
 class DistinctPlaces:

@@ -197,6 +197,7 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
             ("wires",), partial(points_table, values, "wires", "recording")
         ),
         "figures of observers of conductors": printed("observers", "observers.txt", 0),
+        "figures of wires at towers": printed("wires_at_towers", "wires_at_towers.txt", 0),
         "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }

@@ -32,7 +32,7 @@ class Orbit(NamedTuple):
     """The kernels of an orbit, by position.
 
     Attributes:
-        n: number of kernels.
+        n: number of kernels that differ.
         size: (kz, ky, kx).
         starts: (kz * ky * kx + 1,) int64: position q, in C order, has the rows
             ``starts[q] : starts[q + 1]``.
@@ -60,8 +60,8 @@ class Orbit(NamedTuple):
         Args:
             dense: share of positions that are not zero above which they are not stored by position.
         """
+        kernels = _differing(kernels.detach())
         n, kz, ky, kx = kernels.shape
-        kernels = kernels.detach()
         if int(torch.count_nonzero(kernels)) > dense * kernels.numel():
             value = np.empty((0, LANES), kernels.numpy().dtype)
             none = np.zeros(1, np.int64), np.empty(0, np.int32), value, np.empty((0, 2), np.int64)
@@ -76,6 +76,13 @@ class Orbit(NamedTuple):
         lines = np.stack([seen.argmax(axis=1), kx - seen[:, ::-1].argmax(axis=1)], axis=1)
         lines[~seen.any(axis=1)] = 0
         return cls(n, (kz, ky, kx), starts, first, value, lines)
+
+
+def _differing(kernels: Tensor) -> Tensor:
+    """The kernels of an orbit without the second half turn, if it repeats the first one."""
+    half, rest = divmod(len(kernels), 2)
+    repeats = half > 0 and not rest and torch.equal(kernels[:half], kernels[half:])
+    return kernels[:half] if repeats else kernels
 
 
 def strongest_at_voxels(

@@ -4,5 +4,6 @@
 - ``components``: rules alone, models alone, and both.
 - ``label_noise``: training on labels of which a known share is wrong (thesis 5.2.5).
 - ``studies``: the studies and ablations of thesis 5.2.7 and 5.3.
+- ``wires_at_towers``: wires that a model finds at synthetic towers.
 - ``domain_gap``: synthetic crops compared with real ones.
 """

@@ -44,6 +44,15 @@ def test_it_is_the_maximum_of_the_convolutions(size, valued, dense):
 
 
 @pytest.mark.parametrize("dense", [BY_POSITION, ONE_BY_ONE])
+def test_a_second_half_turn_that_repeats_the_first_is_not_computed(dense):
+    occupancy, several = grids(1), kernels(2)
+    once, twice = Orbit.of(several, dense), Orbit.of(torch.cat([several, several]), dense)
+    assert once.n == twice.n
+    assert np.array_equal(*(strongest_at_voxels(occupancy, orbit) for orbit in (once, twice)))
+    assert Orbit.of(torch.cat([several, -several]), dense).n == 2 * once.n
+
+
+@pytest.mark.parametrize("dense", [BY_POSITION, ONE_BY_ONE])
 def test_it_answers_at_other_voxels(dense):
     occupancy, several = grids(3), kernels(4)
     at = np.sort(np.random.default_rng(5).choice(3 * int(np.prod(SHAPE)), 50, replace=False))

@@ -1,0 +1,151 @@
+"""Points of conductors at synthetic towers that a model of wires finds, by distance from the axis.
+
+    python -m scenenet.experiments.wires_at_towers [--model WIRES] [--seed 5] [--kinds ...]
+
+makes the surroundings of a few towers of each kind, as towers that only carry and as tension
+towers; those of pylons with bundles of one, two and four wires, and with few and with many points.
+Prints a Markdown table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from scenenet.core.errors import InputError
+from scenenet.core.scratch import scratch_folder
+from scenenet.detection.settings import DetectionSettings
+from scenenet.metrics.voxel_scores import Confusion
+from scenenet.models.model_file import read_model
+from scenenet.models.packaged import WIRES, packaged_model
+from scenenet.pointcloud.reading import read
+from scenenet.prediction.predict import predict_survey
+from scenenet.prediction.settings import PredictSettings
+from scenenet.synthetic.codes import CONDUCTOR
+from scenenet.synthetic.corridor import Corridor
+from scenenet.synthetic.settings import Kind, SyntheticSettings
+from scenenet.synthetic.survey import make_survey
+
+DISTANCES_M = (0.0, 3.0, 6.0, 9.0, 15.0)
+"""m, distances from the axis of the nearest tower between which points are counted together."""
+POLES: Mapping[str, Any] = {"density": 20.0, "margin": 14.0}
+PYLONS: Mapping[str, Any] = {
+    "height": (24, 50), "span": 310, "span_spread": 30, "half_width": 20, "circuits": 2,
+    "earth_wires": 1, "catenary": 1600, "clearing": 6, "relief": 60, "flight_height": (90, 130),
+    "high_strays": 0.02, "margin": 15.0,
+}  # fmt: skip
+"""Settings of the surroundings of poles and of pylons."""
+BUNDLES = (1, 2, 4)
+DENSITIES: tuple[tuple[float, float], ...] = ((12.0, 18.0), (60.0, 60.0))
+"""Pulses per m2 of ground, and points per m2 of tower members, of pylons."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What is found at the towers of one survey.
+
+    Attributes:
+        of: kind of tower, wires of a bundle, pulses per m2, and whether they are tension towers.
+        near: points from each of ``DISTANCES_M`` to the next; the last one has no end.
+    """
+
+    of: tuple[str, int, float, bool]
+    near: tuple[Confusion, ...]
+
+
+def cases(kinds: Sequence[str], towers: int, seed: int) -> Iterator[SyntheticSettings]:
+    """The settings of each survey. Each has a seed of its own, counted from ``seed``."""
+    for kind in kinds:
+        pylons = kind in ("lattice", "window")
+        forms = [
+            {**PYLONS, "bundle": bundle, "density": pulses, "tower_density": members}
+            for bundle, (pulses, members) in product(BUNDLES, DENSITIES)
+        ]
+        for form, tension in product(forms if pylons else [dict(POLES)], (0.0, 1.0)):
+            yield SyntheticSettings(
+                **form, kinds={kind: 1.0}, section=1, towers=towers, seed=seed, tension=tension
+            )
+            seed += 1
+
+
+def look(settings: SyntheticSettings, wires: Path, folder: Path) -> Found:
+    """Make a survey, and compare the points that the model finds with the truth.
+
+    Raises:
+        InputError: the model cannot be used.
+    """
+    name = f"seed {settings.seed}"
+    survey, true = folder / f"{settings.seed}.laz", folder / f"{settings.seed}.truth.laz"
+    make_survey(settings, survey, true, progress=f"{name}: survey made")
+    truth, (_, card) = read(true), read_model(wires)
+    with predict_survey(survey, wires, PredictSettings(), DetectionSettings()) as predicted:
+        found = np.asarray(predicted.look_up(truth.xyz).probability) >= card.tau
+    axes = np.array([(tower.x, tower.y) for tower in Corridor(settings).towers])
+    away = np.min([np.hypot(*(truth.xyz[:, :2] - axis).T) for axis in axes], axis=0)
+    conductor = truth.classification == CONDUCTOR
+    near = []
+    for low, high in pairwise((*DISTANCES_M, np.inf)):
+        here = (away >= low) & (away < high)
+        near.append(Confusion.of(found[here], conductor[here]))
+    kind, *_ = settings.kinds
+    return Found((kind, settings.bundle, settings.density, settings.tension > 0), tuple(near))
+
+
+def table(found: Sequence[Found]) -> list[str]:
+    """A Markdown table: recall, precision at each distance; IoU of all points, and of the answer
+    that every point is a conductor."""
+    bands = [f"{low:g} to {high:g} m" for low, high in pairwise(DISTANCES_M)]
+    head = ["towers", "wires", "pulses per m2", "tension", *bands, f"from {DISTANCES_M[-1]:g} m",
+            "IoU", "every point: IoU"]  # fmt: skip
+    lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
+    for row in found:
+        kind, bundle, density, tension = row.of
+        total = sum(row.near, Confusion())
+        cells = [kind, f"{bundle}", f"{density:g}", "yes" if tension else "no"]
+        cells += [f"{_text(c.recall)}, {_text(c.precision)}" for c in row.near]
+        every = Confusion(tp=total.tp + total.fn, fp=total.fp + total.tn)
+        cells += [_text(total.iou_tower), _text(every.iou_tower)]
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
+
+
+def _text(score: float | None) -> str:
+    return "-" if score is None else f"{score:.2f}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; its exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m scenenet.experiments.wires_at_towers",
+        description=__doc__.splitlines()[0] if __doc__ else None,
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        default=packaged_model(WIRES),
+        help="model of wires (default: that of the package)",
+    )
+    parser.add_argument("--towers", type=int, default=3, help="of each survey (default 3)")
+    parser.add_argument("--seed", type=int, default=5, help="of the first survey (default 5)")
+    parser.add_argument("--kinds", nargs="+", choices=get_args(Kind), default=get_args(Kind))
+    chosen = parser.parse_args(arguments)
+    try:
+        with scratch_folder() as folder:
+            settings = cases(chosen.kinds, chosen.towers, chosen.seed)
+            found = [look(of, chosen.model, folder) for of in settings]
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 1
+    print("\n".join(table(found)))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

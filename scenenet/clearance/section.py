@@ -12,6 +12,7 @@ from scenenet.clearance.kinds import NO_OBSTACLE, Surroundings, surroundings
 from scenenet.clearance.near_points import Near, near_points
 from scenenet.clearance.settings import ClearanceLimits, ClearanceSettings
 from scenenet.clearance.trees import Trees, find_trees
+from scenenet.clearance.untraced import untraced
 from scenenet.line.frame import SpanFrame
 from scenenet.line.records import Conductor
 from scenenet.pointcloud.class_schemes import ClassScheme
@@ -77,9 +78,23 @@ def sections(frame: SpanFrame, conductors: Sequence[Conductor], reach: float) ->
     return [Area(frame, first, last, half_width) for first, last in pairwise(borders.tolist())]
 
 
-PointsIn = Callable[[Area], tuple[np.ndarray, np.ndarray | None]]
-"""Gives the points (n, 3) m of a survey in an area, in a fixed order, with their class codes (n,)
-uint8, or None where they are not known. Points of towers and stray returns may be left out."""
+@dataclass(frozen=True)
+class SectionPoints:
+    """Points of a survey in an area, in a fixed order, without those of towers.
+
+    Attributes:
+        xyz: (n, 3) m.
+        codes: (n,) uint8 class codes; None where they are not known.
+        wire: (n,) bool, which points a model takes for wires; None where no model says so.
+    """
+
+    xyz: np.ndarray
+    codes: np.ndarray | None = None
+    wire: np.ndarray | None = None
+
+
+PointsIn = Callable[[Area], SectionPoints]
+"""Gives the points of a survey in an area."""
 
 
 @dataclass(frozen=True)
@@ -143,10 +158,13 @@ def look_around(
         few_points: of ``ClearanceSettings``.
     """
     wide = Area(area.frame, area.first - AROUND_M, area.last + AROUND_M, area.half_width)
-    xyz, codes = points(wide)
-    free = ~on_wires(xyz, wires)
-    xyz, codes = xyz[free], None if codes is None else codes[free]
-    return surroundings(xyz, codes, scheme, few_points)
+    found = points(wide)
+    free = ~on_wires(found.xyz, wires)
+    if found.wire is not None:
+        doubtful = np.flatnonzero(found.wire & free)
+        free[doubtful] = ~untraced(area.frame.to_frame(found.xyz[doubtful]))
+    codes = None if found.codes is None else found.codes[free]
+    return surroundings(found.xyz[free], codes, scheme, few_points)
 
 
 def on_wires(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:

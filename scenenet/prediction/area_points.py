@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scenenet.clearance.section import Area
+from scenenet.clearance.section import Area, SectionPoints
 from scenenet.prediction.found_line import WireSearch
 from scenenet.prediction.work.structures import Owners, Structures
 from scenenet.prediction.work.tiling import TileSpool, groups
 
 KEPT_POINTS = 4_000_000
 """Points in memory besides those of a section: neighbouring sections need the same tiles."""
+
+JUMPER_M = 3.0
+"""m beyond the reach of a tower in which points in voxels of wires are its jumpers and strings."""
 
 FREE, TOWER, WIRE = 0, 1, 2
 """What a point belongs to: nothing, the structure of a tower, or a voxel of a wire."""
@@ -80,6 +83,9 @@ class AreaLookUp:
         self._spool, self._wires, self._classes = spool, wires, classes
         self._columns = spool.columns()
         self._owners = Owners(structures, spool.lattice)
+        shapes = [shape for _, shape in structures.numbered]
+        self._axes = np.array([(shape.x, shape.y) for shape in shapes]).reshape(-1, 2)
+        self._reach = np.array([shape.reach for shape in shapes]) + JUMPER_M
         self._kept: OrderedDict[int, AreaPoints] = OrderedDict()
 
     def all(self, area: Area) -> AreaPoints:
@@ -97,12 +103,29 @@ class AreaLookUp:
             np.concatenate(codes) if self._classes else None,
         )
 
-    def free(self, area: Area) -> tuple[np.ndarray, np.ndarray | None]:
-        """The points in an area that belong to no tower or wire, with their class codes
-        (``scenenet.clearance.section.PointsIn``)."""
+    def free(self, area: Area) -> SectionPoints:
+        """The points in an area that belong to no tower, and are in no voxel of a wire."""
         found = self.all(area)
-        free = found.at(found.part == FREE)
-        return free.xyz, free.codes
+        found = found.at(found.part == FREE)
+        return SectionPoints(found.xyz, found.codes)
+
+    def obstacles(self, area: Area) -> SectionPoints:
+        """The points in an area that belong to no tower, nor to its jumpers and strings."""
+        found = self.all(area)
+        free = found.part != TOWER
+        wire = np.flatnonzero(found.part == WIRE)
+        free[wire] = ~self._at_tower(found.xyz[wire])
+        found = found.at(free)
+        return SectionPoints(found.xyz, found.codes, found.part == WIRE)
+
+    def _at_tower(self, xyz: np.ndarray) -> np.ndarray:
+        """(n,) bool: which points (n, 3) m may be on a jumper or a string."""
+        from scipy.spatial import cKDTree
+
+        if not len(self._axes):
+            return np.zeros(len(xyz), bool)
+        away, tower = cKDTree(self._axes).query(xyz[:, :2])
+        return np.asarray(away <= self._reach[tower])
 
     def _tile(self, code: int) -> AreaPoints:
         if code not in self._kept:

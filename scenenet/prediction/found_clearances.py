@@ -27,8 +27,8 @@ def find_clearances_in_survey(
         spool: the points of all its files.
         line: its lines.
         structures: the shapes of its towers; their points are no obstacles.
-        wires: where the model of wires found them; their points are no obstacles either, because
-            some belong to conductors that were not traced.
+        wires: where the model of wires found them. Points there are no obstacles if they are at a
+            tower or run along the span: they are of jumpers, or of conductors that were not traced.
         scheme: of the class codes, which ``spool`` then keeps; None where the height above ground
             says what points are.
         progress: label of the progress on stderr; None shows no progress.
@@ -37,4 +37,4 @@ def find_clearances_in_survey(
         InputError: the limits have none for the voltage.
     """
     points = AreaLookUp(spool, structures, wires, classes=scheme is not None)
-    return find_clearances(line, points.free, settings, scheme, progress)
+    return find_clearances(line, points.obstacles, settings, scheme, progress)

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from scenenet.clearance.find_clearances import find_clearances
 from scenenet.clearance.records import SurveyClearances
+from scenenet.clearance.section import SectionPoints
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.errors import InputError
 from scenenet.line.catenary import Catenary
@@ -46,7 +47,7 @@ def within(xyz, codes):
 
     def points(area):
         inside = area.has(xyz)
-        return xyz[inside], codes[inside]
+        return SectionPoints(xyz[inside], codes[inside])
 
     return points
 
@@ -208,7 +209,7 @@ def test_a_wire_of_another_line_is_an_obstacle_and_one_of_the_own_line_is_not():
     )
     level = np.random.default_rng(1).uniform((-30, -90, 0), (230, 90, 0.05), (20_000, 3))
     found = find_clearances(
-        line, lambda area: (level[area.has(level)], None), ClearanceSettings(voltage=400)
+        line, lambda area: SectionPoints(level[area.has(level)]), ClearanceSettings(voltage=400)
     )
     wires = [place for place in found.places if place.kind == "wire"]
     assert {(place.span_id, place.other_span) for place in wires} == {(1, 2), (1, 3), (2, 1)}
@@ -219,7 +220,7 @@ def test_a_wire_of_another_line_is_an_obstacle_and_one_of_the_own_line_is_not():
     near = replace(line, conductors=(*line.conductors[:2], wire_of(
         straight((100, -80, 24), (104, 80, 24)), 2, 1), line.conductors[3]))  # fmt: skip
     worse = find_clearances(
-        near, lambda area: (level[area.has(level)], None), ClearanceSettings(voltage=400)
+        near, lambda area: SectionPoints(level[area.has(level)]), ClearanceSettings(voltage=400)
     )
     crossing = [p for p in worse.dangers if p.kind == "wire"]
     assert {(place.span_id, place.other_span) for place in crossing} == {(1, 2), (2, 1)}

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 
 from scenenet.clearance.find_clearances import find_clearances
 from scenenet.clearance.sags import hung, read_sags
+from scenenet.clearance.section import SectionPoints
 from scenenet.clearance.settings import ClearanceSettings, SpanSag
 from scenenet.core.errors import InputError
 from scenenet.line.records import AS_FLOWN
@@ -38,7 +39,7 @@ def measured(corridor, sags):
 
     def points(area):
         inside = area.has(xyz)
-        return xyz[inside], codes[inside]
+        return SectionPoints(xyz[inside], codes[inside])
 
     return find_clearances(line, points, ClearanceSettings(sags=sags))
 

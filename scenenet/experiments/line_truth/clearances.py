@@ -11,8 +11,8 @@ from scipy.spatial import cKDTree
 
 from scenenet.clearance.danger import places
 from scenenet.clearance.distance import nearest_on
-from scenenet.clearance.records import Clearance, SurveyClearances
-from scenenet.clearance.settings import VEGETATION, ClearanceSettings
+from scenenet.clearance.records import SurveyClearances
+from scenenet.clearance.settings import VEGETATION, WIRE, ClearanceSettings
 from scenenet.experiments.line_truth.conductors import percentiles, true_one
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.cloud import PointCloud
@@ -106,7 +106,7 @@ def compare(
     true_places = [rows for rows in joined if len(rows) >= settings.few_points]
     listed = [place for place in found.dangers if place.kind == VEGETATION]
     at = np.array([(place.x, place.y, place.z) for place in listed]).reshape(-1, 3)
-    shown = _shown(listed, found, limits.vegetation)
+    shown = _shown(found, limits.vegetation)
     many = np.array([place.points >= settings.few_points for place in listed], bool)
     missed = sum(
         not len(shown) or cKDTree(shown).query(danger[rows, :2])[0].min() > SAME_PLACE_M
@@ -121,13 +121,15 @@ def compare(
     )  # fmt: skip
 
 
-def _shown(listed: Sequence[Clearance], found: SurveyClearances, limit: float) -> np.ndarray:
-    """(n, 2) m, where the results show a danger place of vegetation.
+def _shown(found: SurveyClearances, limit: float) -> np.ndarray:
+    """(n, 2) m, where the results show a danger place of what stands.
 
     Places that are joined by what is found between them are listed as one, at their worst point.
-    The profile of the span shows the others.
+    The profile of the span shows the others. What is thin and straight in the air, as a cable is,
+    is listed as a wire.
     """
-    spans = {place.span_id for place in listed}
+    listed = [place for place in found.dangers if place.kind in (VEGETATION, WIRE)]
+    spans = {place.span_id for place in listed if place.kind == VEGETATION}
     steps = (
         (step.x, step.y)
         for step in found.profile

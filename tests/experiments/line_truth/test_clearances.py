@@ -9,6 +9,7 @@ import pytest
 from fixtures.true_line import true_line
 
 from scenenet.clearance.find_clearances import find_clearances
+from scenenet.clearance.section import SectionPoints
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.experiments.line_truth.clearances import STANDING, compare, table
 from scenenet.pointcloud import PointCloud
@@ -32,7 +33,7 @@ def survey():
 
     def points(area):
         inside = area.has(standing)
-        return standing[inside], None
+        return SectionPoints(standing[inside])
 
     line = true_line(corridor.conductors)
     return corridor, PointCloud(xyz, codes), line, find_clearances(line, points, LIMITS)

@@ -16,6 +16,7 @@ from pydantic import Field, ValidationError, model_validator
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.config.errors import explain
 from scenenet.config.observers import ObserverSettings, predicting
+from scenenet.config.written import geneos_in, merged, with_values
 from scenenet.core.errors import InputError, in_file
 from scenenet.core.provenance import FULL_BELOW_BYTES
 from scenenet.core.provided_code import KERNELS
@@ -227,10 +228,10 @@ class Config(Settings):
         values, studies = raw["study_values"], raw.get("studies")
         if not isinstance(studies, list | tuple):
             return raw
-        return {**raw, "studies": [_with_values(study, values) for study in studies]}
+        return {**raw, "studies": [with_values(study, values) for study in studies]}
 
     @model_validator(mode="after")
-    def _names_fit(self) -> Self:
+    def _listed_once(self) -> Self:
         of_models = [model.name for model in self.models]
         of_observers = [observer.name for observer in self.observers]
         for what, names in (
@@ -242,17 +243,16 @@ class Config(Settings):
         ):
             if twice := [str(name) for name, count in Counter(names).items() if count > 1]:
                 raise ValueError(f"{what}: {', '.join(twice)} is listed more than once")
+        return self
+
+    @model_validator(mode="after")
+    def _models_fit(self) -> Self:
+        """Refuse models that the workflow cannot train or compare."""
         whole = [model.name for model in self.models if model.gives_whole_towers]
         if whole and not self.score_towers:
             raise ValueError(
                 f"score_towers: {', '.join(whole)} gives whole towers, so they have to be scored; "
                 "remove this setting, or set metric.whole_towers: false"
-            )
-        known = [model.name for model in self.models]
-        if self.predict.model not in known:
-            raise ValueError(
-                f"predict.model: {self.predict.model!r} is not one of the models: "
-                f"{', '.join(known)}"
             )
         for model in self.models:
             if not model.finds.is_tower:
@@ -265,20 +265,35 @@ class Config(Settings):
                 raise ValueError(
                     f"model {model.name}: training.epochs 0 is only for a study; give at least 1"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _named_models_are_listed(self) -> Self:
+        """Refuse what names a model that there is not, or one that it cannot use."""
+        known = [model.name for model in self.models]
+        if self.predict.model not in known:
+            raise ValueError(
+                f"predict.model: {self.predict.model!r} is not one of the models: "
+                f"{', '.join(known)}"
+            )
         for study in self.studies:
             if study.model not in known:
                 raise ValueError(f"study {study.name}: {study.model!r} is not one of the models")
             for plan in study.plans(self.model_named(study.model), self.voxels, self.split):
                 _require_measured_in_workflow(f"{study.model} of study {study.name}", plan.model)
         predicting(self.predict.observers, self.observers)
+        self.label_noise_models()
+        self.crossed_models()
+        return self
+
+    @model_validator(mode="after")
+    def _voltage_has_limits(self) -> Self:
         try:
             self.clearance.applied()
         except InputError as error:
             raise ValueError(
                 f"clearance.voltage: {error.problem}; add limits to clearance.limits"
             ) from None
-        self.label_noise_models()
-        self.crossed_models()
         return self
 
     def label_noise_models(self) -> list[ModelSettings]:
@@ -344,19 +359,6 @@ class Config(Settings):
         return self.model_dump(mode="json")
 
 
-def _with_values(study: Any, values: Mapping[str, Any]) -> Any:
-    """A study, or a variant of one, as it was written, with other values for what it changes."""
-    if not isinstance(study, Mapping):
-        return study
-    replaced = dict(study)
-    for part in ("common", "changes"):
-        if isinstance(changes := study.get(part), Mapping):
-            replaced[part] = {name: values.get(name, value) for name, value in changes.items()}
-    if isinstance(variants := study.get("variants"), list | tuple):
-        replaced["variants"] = [_with_values(variant, values) for variant in variants]
-    return replaced
-
-
 def _require_measured_in_workflow(name: str, model: ModelSettings) -> None:
     """Refuse a model whose measurement needs more than the stores of voxels have."""
     if model.measurement not in IN_WORKFLOW:
@@ -364,25 +366,6 @@ def _require_measured_in_workflow(name: str, model: ModelSettings) -> None:
             f"model {name}: measurement {model.measurement}: the workflow measures "
             f"{' and '.join(IN_WORKFLOW)}; train others with scenenet train --measurement"
         )
-
-
-def geneos_in(settings: Any) -> set[str]:
-    """The names of kernels anywhere in settings, also in the changes of studies by dotted name."""
-    if isinstance(settings, list | tuple):
-        return set().union(*map(geneos_in, settings))
-    if not isinstance(settings, Mapping):
-        return set()
-    found: set[str] = set()
-    for key, value in settings.items():
-        named = str(key).rpartition(".")[2] == "geneos"
-        found |= _texts(value) if named else geneos_in(value)
-    return found
-
-
-def _texts(value: Any) -> set[str]:
-    if isinstance(value, list | tuple):
-        return set().union(*map(_texts, value))
-    return {value} if isinstance(value, str) else set()
 
 
 def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
@@ -406,14 +389,3 @@ def load(raw: Mapping[str, Any], file: str | None = None) -> Config:
         return Config.model_validate(dict(raw))
     except ValidationError as error:
         raise InputError(explain(error, Config), file=file or "configuration") from None
-
-
-def merged(base: Mapping[str, Any], over: Any) -> Any:
-    """``base`` overridden by ``over``: mappings are merged key by key, other values replaced."""
-    if not isinstance(over, Mapping):
-        return over
-    both = dict(base)
-    for key, value in over.items():
-        inner = both.get(key)
-        both[key] = merged(inner, value) if isinstance(inner, Mapping) else value
-    return both

@@ -10,7 +10,8 @@ import pytest
 import yaml
 
 from scenenet.config import reference as config_reference
-from scenenet.config.schema import Config, load, merged
+from scenenet.config.schema import Config, load
+from scenenet.config.written import merged
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 from scenenet.core.settings import changed

@@ -15,7 +15,8 @@ from snakemake.logging import logger
 
 from scenenet.core.code_hash import code_hash
 from scenenet.config.review_files import find_reviews
-from scenenet.config.schema import geneos_in, load, merged
+from scenenet.config.schema import load
+from scenenet.config.written import geneos_in, merged
 from scenenet.core.errors import InputError
 from scenenet.figures import CROP_RANKS
 from scenenet.core.files import digest

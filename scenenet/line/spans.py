@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scenenet.core.progress import track
+from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M
 from scenenet.line.frame import SpanFrame
 from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.lone_wires import lone_spans
@@ -39,26 +40,61 @@ def find_spans(
 ) -> list[TracedSpan]:
     """All spans, those between two towers first.
 
+    A crane beside the line may be nearer than the next tower, so a tower that stands beside all of
+    the wires takes those that no other one does.
+
     Args:
         progress: label of the progress on stderr; None shows no progress.
     """
     free = np.ones(len(points), bool)
     found: list[TracedSpan] = []
+    doubtful: list[tuple[LineTower, LineTower]] = []
     pairs = list(_pairs(points, towers))
     for first, last in pairs if progress is None else track(pairs, progress):
-        frame = SpanFrame.between(first.place, last.place)
-        if _leads_elsewhere(found, first, frame.direction) or _leads_elsewhere(
-            found, last, -frame.direction
-        ):
-            continue
-        rows = points.beside(frame, REACH_M)
-        rise = (last.base - first.base) / frame.length
-        wires = tuple(_between(traced(points, rows[free[rows]], frame, rise), frame, first, last))
-        if wires:
-            for wire in wires:
-                free[wire.rows] = False
-            found.append(TracedSpan(first, last, frame, wires))
+        span = _span(points, free, found, first, last)
+        if span is not None and (_beside(first, span.wires) or _beside(last, span.wires)):
+            doubtful.append((first, last))
+        elif span is not None:
+            _add(span, found, free)
+    for first, last in doubtful:
+        span = _span(points, free, found, first, last)
+        if span is not None:
+            _add(span, found, free)
     return found + lone_spans(points, free, towers)
+
+
+def _add(span: TracedSpan, found: list[TracedSpan], free: np.ndarray) -> None:
+    """Add a span; its points are no longer ``free`` (N,)."""
+    found.append(span)
+    for wire in span.wires:
+        free[wire.rows] = False
+
+
+def _span(
+    points: WirePoints,
+    free: np.ndarray,
+    found: Sequence[TracedSpan],
+    first: LineTower,
+    last: LineTower,
+) -> TracedSpan | None:
+    """The span between two towers, among points that are ``free`` (N,); None if there is none."""
+    frame = SpanFrame.between(first.place, last.place)
+    if _leads_elsewhere(found, first, frame.direction) or _leads_elsewhere(
+        found, last, -frame.direction
+    ):
+        return None
+    rows = points.beside(frame, REACH_M)
+    rise = (last.base - first.base) / frame.length
+    wires = tuple(_between(traced(points, rows[free[rows]], frame, rise), frame, first, last))
+    return TracedSpan(first, last, frame, wires) if wires else None
+
+
+def _beside(tower: LineTower, wires: Sequence[HungWire]) -> bool:
+    """Whether all of these parallel wires pass a tower on one side, and none is close to it."""
+    sides = [float(wire.catenary.along(tower.place[None])[1][0]) for wire in wires]
+    pole = tower.width is not None and tower.width <= POLE_M
+    limit = BESIDE_M if pole else BESIDE * tower.height
+    return max(min(sides), -max(sides)) > limit
 
 
 def _leads_elsewhere(found: Sequence[TracedSpan], tower: LineTower, way: np.ndarray) -> bool:

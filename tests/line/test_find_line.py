@@ -12,7 +12,7 @@ from fixtures.line_scene import KnownLine, points_on
 from scenenet.line.catenary import Catenary
 from scenenet.line.find_line import find_line
 from scenenet.line.hung import STEEP, LineTower
-from scenenet.line.records import SurveyLine
+from scenenet.line.records import UNHELD, SurveyLine
 from scenenet.line.wire_points import WirePoints
 
 
@@ -157,3 +157,27 @@ def test_conductors_of_a_steep_span_are_found_where_few_of_their_points_are_cert
     middles = [c.catenary.at_shares(np.array([0.5]))[0, 2] for c in line.conductors]
     expected = [wire.at_shares(np.array([0.5]))[0, 2] for wire in wires]
     assert middles == pytest.approx(expected, abs=0.05)
+
+
+def test_a_crane_beside_the_line_takes_no_conductor_from_the_tower_behind_it():
+    rng = np.random.default_rng(0)
+    towers = [LineTower(1, 0.0, 0.0, 100.0, 16.0, 0.4), LineTower(2, 70.0, 0.0, 100.0, 16.0, 0.4)]
+    crane = LineTower(3, 40.0, 6.5, 100.0, 40.0, 1.8)
+    wires = [Catenary((0.0, t, 114.0), (70.0, t, 114.0), 700.0) for t in (-1.8, 0.0, 1.8)]
+    xyz = np.concatenate([points_on(wire, 0.8, rng) for wire in wires])
+    points = WirePoints(xyz, np.ones(len(xyz), bool))
+    line = find_line(points, [*towers, crane], lambda place, radius: place[None])
+    [span] = line.spans
+    assert (span.conductors, span.from_tower, span.to_tower) == (3, 1, 2)
+    [note] = line.notes
+    assert (note.what, note.tower) == (UNHELD, 3)
+
+
+def test_a_tower_beside_its_conductors_holds_those_that_no_other_one_does():
+    rng = np.random.default_rng(0)
+    towers = [LineTower(1, 0.0, 0.0, 100.0, 16.0, 0.4), LineTower(2, 70.0, 4.0, 100.0, 16.0, 0.4)]
+    wires = [Catenary((0.0, t, 114.0), (70.0, t, 114.0), 700.0) for t in (-1.8, 0.0, 1.8)]
+    xyz = np.concatenate([points_on(wire, 0.8, rng) for wire in wires])
+    line = find_line(WirePoints(xyz, np.ones(len(xyz), bool)), towers, lambda p, r: p[None])
+    [span] = line.spans
+    assert (span.conductors, span.from_tower, span.to_tower) == (3, 1, 2)

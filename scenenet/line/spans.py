@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from scenenet.core.progress import track
-from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M
+from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M, SHORTEST_SPAN_M
 from scenenet.line.frame import SpanFrame
 from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.lone_wires import lone_spans
@@ -30,6 +30,10 @@ BEHIND = 8.0
 """Degrees from the direction of a span in which no longer span leaves the same tower: what is there
 is behind the next one."""
 
+MUCH_LOWER = 0.75
+"""Share of the height of a tower below which what stands next to it is of no use to its line: two
+supports of a line so near to each other are about as tall."""
+
 UNSEEN_M, UNSEEN_SHARE = 40.0, 0.35
 """m, and share of a span, that may be hidden between the first point of a wire and its tower; the
 greater of both."""
@@ -40,8 +44,8 @@ def find_spans(
 ) -> list[TracedSpan]:
     """All spans, those between two towers first.
 
-    A crane beside the line may be nearer than the next tower, so a tower that stands beside all of
-    the wires takes those that no other one does.
+    A crane beside the line, or a mast under it, may be nearer than the next tower. So a tower that
+    stands beside all of the wires, or next to a much taller one, takes those that no other does.
 
     Args:
         progress: label of the progress on stderr; None shows no progress.
@@ -49,10 +53,11 @@ def find_spans(
     free = np.ones(len(points), bool)
     found: list[TracedSpan] = []
     doubtful: list[tuple[LineTower, LineTower]] = []
+    low = _next_to_taller(towers)
     pairs = list(_pairs(points, towers))
     for first, last in pairs if progress is None else track(pairs, progress):
         span = _span(points, free, found, first, last)
-        if span is not None and (_beside(first, span.wires) or _beside(last, span.wires)):
+        if span is not None and any(t.id in low or _beside(t, span.wires) for t in (first, last)):
             doubtful.append((first, last))
         elif span is not None:
             _add(span, found, free)
@@ -87,6 +92,16 @@ def _span(
     rise = (last.base - first.base) / frame.length
     wires = tuple(_between(traced(points, rows[free[rows]], frame, rise), frame, first, last))
     return TracedSpan(first, last, frame, wires) if wires else None
+
+
+def _next_to_taller(towers: Sequence[LineTower]) -> set[int]:
+    """Ids of the towers that are nearer to a much taller one than any span is long."""
+    from scipy.spatial import cKDTree
+
+    places = np.array([tower.place for tower in towers]).reshape(-1, 2)
+    near = cKDTree(places).query_pairs(SHORTEST_SPAN_M, output_type="ndarray")
+    pairs = (sorted((towers[i], towers[j]), key=lambda t: t.height) for i, j in near)
+    return {low.id for low, high in pairs if low.height < MUCH_LOWER * high.height}
 
 
 def _beside(tower: LineTower, wires: Sequence[HungWire]) -> bool:

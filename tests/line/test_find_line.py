@@ -173,6 +173,21 @@ def test_a_crane_beside_the_line_takes_no_conductor_from_the_tower_behind_it():
     assert (note.what, note.tower) == (UNHELD, 3)
 
 
+def test_a_mast_under_the_conductors_takes_none_from_the_tower_next_to_it():
+    rng = np.random.default_rng(0)
+    towers = [LineTower(1, 0.0, 0.0, 100.0, 30.0, 2.0), LineTower(2, 300.0, 0.0, 100.0, 30.0, 2.0)]
+    mast = LineTower(3, 290.0, 7.0, 100.0, 20.0, 0.8)
+    sides = (-8.0, -7.0, -6.0, 6.0, 7.0, 8.0)
+    wires = [Catenary((0.0, t, 122.0), (300.0, t, 122.0), 1500.0) for t in sides]
+    xyz = np.concatenate([points_on(wire, 1.0, rng) for wire in wires])
+    points = WirePoints(xyz, np.ones(len(xyz), bool))
+    line = find_line(points, [*towers, mast], lambda place, radius: place[None])
+    [span] = line.spans
+    assert (span.conductors, span.from_tower, span.to_tower) == (6, 1, 2)
+    [note] = line.notes
+    assert (note.what, note.tower) == (UNHELD, 3)
+
+
 def test_a_tower_beside_its_conductors_holds_those_that_no_other_one_does():
     rng = np.random.default_rng(0)
     towers = [LineTower(1, 0.0, 0.0, 100.0, 16.0, 0.4), LineTower(2, 70.0, 4.0, 100.0, 16.0, 0.4)]

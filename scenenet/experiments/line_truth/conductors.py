@@ -16,6 +16,10 @@ from scenenet.synthetic.truth import TrueConductor
 SAME_M = 0.3
 """m, median distance up to which a conductor is the true one."""
 
+PLACES, HALF = 60, 0.5
+"""Places of a true conductor that are compared, and smallest share of it along which the one found
+runs. That of the next span touches it at the tower."""
+
 AT_TOWER_M = 5.0
 """m, distance up to which a tower is the true one (docs/reference/glossary.md)."""
 
@@ -97,18 +101,19 @@ def compare(
 
 
 def true_one(true: TrueConductor, found: Sequence[Conductor]) -> Conductor | None:
-    """The conductor that is the true one; None if there is none."""
-    apart = [(_median_distance(true, c), n) for n, c in enumerate(found)]
+    """The conductor that is the true one, along half of it at least; None if there is none."""
+    apart = [(_median_distance(true, c, HALF), n) for n, c in enumerate(found)]
     distance, number = min(apart, default=(np.inf, -1))
     return found[number] if distance <= SAME_M else None
 
 
-def _median_distance(true: TrueConductor, found: Conductor) -> float:
-    """m, of the part of the true conductor along which the found one runs."""
-    places = true.catenary.at_shares(np.linspace(0, 1, 60))
+def _median_distance(true: TrueConductor, found: Conductor, least: float = 2 / PLACES) -> float:
+    """m, of the part of the true conductor along which the found one runs; infinite for less than
+    this share of it."""
+    places = true.catenary.at_shares(np.linspace(0, 1, PLACES))
     along, _ = found.catenary.along(places)
     beside = (along >= -1.0) & (along <= found.catenary.length + 1.0)
-    if beside.sum() < 2:
+    if beside.mean() < least:
         return np.inf
     return float(np.median(np.hypot(*found.catenary.residuals(places[beside]))))
 

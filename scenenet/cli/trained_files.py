@@ -78,7 +78,7 @@ def train_files(
         ]
     best = max(found, key=lambda candidate: candidate.tuning.decisive)
     write_model(out, best.model, best.card)
-    return {"model": str(out), "target": settings.finds.name} | _told(files, found, best)
+    return {"model": str(out), "target": settings.finds.name} | _summary(files, found, best)
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def _candidate(
     return _Candidate(seed, tuned, card, result)
 
 
-def _told(files: LabelledFiles, found: Sequence[_Candidate], best: _Candidate) -> dict[str, Any]:
+def _summary(files: LabelledFiles, found: Sequence[_Candidate], best: _Candidate) -> dict[str, Any]:
     """What ``train_files`` returns about the trainings."""
     tuning = best.tuning
     return {

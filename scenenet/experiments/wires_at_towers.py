@@ -9,28 +9,27 @@ Prints a Markdown table.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.core.scratch import scratch_folder
 from scenenet.detection.settings import DetectionSettings
+from scenenet.experiments.wire_options import wire_parser
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.model_file import read_model
-from scenenet.models.packaged import WIRES, packaged_model
 from scenenet.pointcloud.reading import read
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.synthetic.codes import CONDUCTOR
 from scenenet.synthetic.corridor import Corridor
-from scenenet.synthetic.settings import Kind, SyntheticSettings
+from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.synthetic.survey import make_survey
 
 DISTANCES_M = (0.0, 3.0, 6.0, 9.0, 15.0)
@@ -122,19 +121,9 @@ def _text(score: float | None) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; its exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m scenenet.experiments.wires_at_towers",
-        description=__doc__.splitlines()[0] if __doc__ else None,
-    )
-    parser.add_argument(
-        "--model",
-        type=Path,
-        default=packaged_model(WIRES),
-        help="model of wires (default: that of the package)",
-    )
+    parser = wire_parser("wires_at_towers", __doc__)
     parser.add_argument("--towers", type=int, default=3, help="of each survey (default 3)")
     parser.add_argument("--seed", type=int, default=5, help="of the first survey (default 5)")
-    parser.add_argument("--kinds", nargs="+", choices=get_args(Kind), default=get_args(Kind))
     chosen = parser.parse_args(arguments)
     try:
         with scratch_folder() as folder:

@@ -31,8 +31,8 @@ BEHIND = 8.0
 is behind the next one."""
 
 MUCH_LOWER = 0.75
-"""Share of the height of a tower below which what stands next to it is of no use to its line: two
-supports of a line so near to each other are about as tall."""
+"""Share of the height of a tower below which one next to it is doubtful: two supports of a line
+that are so close to each other are about equally tall."""
 
 UNSEEN_M, UNSEEN_SHARE = 40.0, 0.35
 """m, and share of a span, that may be hidden between the first point of a wire and its tower; the

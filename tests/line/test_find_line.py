@@ -159,40 +159,43 @@ def test_conductors_of_a_steep_span_are_found_where_few_of_their_points_are_cert
     assert middles == pytest.approx(expected, abs=0.05)
 
 
-def test_a_crane_beside_the_line_takes_no_conductor_from_the_tower_behind_it():
+def line_of(towers, wires: list[Catenary], step: float = 0.8) -> SurveyLine:
+    """The line of some towers, with points every ``step`` m on these wires alone."""
     rng = np.random.default_rng(0)
-    towers = [LineTower(1, 0.0, 0.0, 100.0, 16.0, 0.4), LineTower(2, 70.0, 0.0, 100.0, 16.0, 0.4)]
-    crane = LineTower(3, 40.0, 6.5, 100.0, 40.0, 1.8)
-    wires = [Catenary((0.0, t, 114.0), (70.0, t, 114.0), 700.0) for t in (-1.8, 0.0, 1.8)]
-    xyz = np.concatenate([points_on(wire, 0.8, rng) for wire in wires])
+    xyz = np.concatenate([points_on(wire, step, rng) for wire in wires])
     points = WirePoints(xyz, np.ones(len(xyz), bool))
-    line = find_line(points, [*towers, crane], lambda place, radius: place[None])
+    return find_line(points, towers, lambda place, radius: place[None])
+
+
+def parallel(sides, length: float, z: float, parameter: float) -> list[Catenary]:
+    """Level wires towards the east, each this far to the north, m."""
+    return [Catenary((0.0, t, z), (length, t, z), parameter) for t in sides]
+
+
+def pole(number: int, x: float, y: float = 0.0) -> LineTower:
+    return LineTower(number, x, y, 100.0, 16.0, 0.4)
+
+
+def assert_one_span(line: SurveyLine, conductors: int, idle: int | None = None):
+    """All conductors lead from tower 1 to tower 2; the tower ``idle`` holds none."""
     [span] = line.spans
-    assert (span.conductors, span.from_tower, span.to_tower) == (3, 1, 2)
-    [note] = line.notes
-    assert (note.what, note.tower) == (UNHELD, 3)
+    assert (span.conductors, span.from_tower, span.to_tower) == (conductors, 1, 2)
+    assert [(n.what, n.tower) for n in line.notes] == ([] if idle is None else [(UNHELD, idle)])
+
+
+def test_a_crane_beside_the_line_takes_no_conductor_from_the_tower_behind_it():
+    crane = LineTower(3, 40.0, 6.5, 100.0, 40.0, 1.8)
+    wires = parallel((-1.8, 0.0, 1.8), 70.0, 114.0, 700.0)
+    assert_one_span(line_of([pole(1, 0.0), pole(2, 70.0), crane], wires), 3, idle=3)
 
 
 def test_a_mast_under_the_conductors_takes_none_from_the_tower_next_to_it():
-    rng = np.random.default_rng(0)
-    towers = [LineTower(1, 0.0, 0.0, 100.0, 30.0, 2.0), LineTower(2, 300.0, 0.0, 100.0, 30.0, 2.0)]
+    towers = [LineTower(n, x, 0.0, 100.0, 30.0, 2.0) for n, x in ((1, 0.0), (2, 300.0))]
     mast = LineTower(3, 290.0, 7.0, 100.0, 20.0, 0.8)
-    sides = (-8.0, -7.0, -6.0, 6.0, 7.0, 8.0)
-    wires = [Catenary((0.0, t, 122.0), (300.0, t, 122.0), 1500.0) for t in sides]
-    xyz = np.concatenate([points_on(wire, 1.0, rng) for wire in wires])
-    points = WirePoints(xyz, np.ones(len(xyz), bool))
-    line = find_line(points, [*towers, mast], lambda place, radius: place[None])
-    [span] = line.spans
-    assert (span.conductors, span.from_tower, span.to_tower) == (6, 1, 2)
-    [note] = line.notes
-    assert (note.what, note.tower) == (UNHELD, 3)
+    wires = parallel((-8.0, -7.0, -6.0, 6.0, 7.0, 8.0), 300.0, 122.0, 1500.0)
+    assert_one_span(line_of([*towers, mast], wires, step=1.0), 6, idle=3)
 
 
 def test_a_tower_beside_its_conductors_holds_those_that_no_other_one_does():
-    rng = np.random.default_rng(0)
-    towers = [LineTower(1, 0.0, 0.0, 100.0, 16.0, 0.4), LineTower(2, 70.0, 4.0, 100.0, 16.0, 0.4)]
-    wires = [Catenary((0.0, t, 114.0), (70.0, t, 114.0), 700.0) for t in (-1.8, 0.0, 1.8)]
-    xyz = np.concatenate([points_on(wire, 0.8, rng) for wire in wires])
-    line = find_line(WirePoints(xyz, np.ones(len(xyz), bool)), towers, lambda p, r: p[None])
-    [span] = line.spans
-    assert (span.conductors, span.from_tower, span.to_tower) == (3, 1, 2)
+    wires = parallel((-1.8, 0.0, 1.8), 70.0, 114.0, 700.0)
+    assert_one_span(line_of([pole(1, 0.0), pole(2, 70.0, 4.0)], wires), 3)

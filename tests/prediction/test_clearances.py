@@ -13,10 +13,16 @@ import pytest
 import shapely
 from fixtures.true_line import true_line
 
+from scenenet.clearance.section import Area
 from scenenet.clearance.settings import ClearanceSettings
+from scenenet.detection.ground import Ground
+from scenenet.detection.head import NO_HEAD
+from scenenet.detection.profile import Profile
+from scenenet.detection.structure import Structure
+from scenenet.line.frame import SpanFrame
 from scenenet.line.records import AS_FLOWN, SurveyLine
 from scenenet.pointcloud.class_schemes import EDP
-from scenenet.prediction.area_points import WireVoxels
+from scenenet.prediction.area_points import JUMPER_M, AreaLookUp, WireVoxels
 from scenenet.prediction.clearance_lists import write_clearance_layers, write_clearances_csv
 from scenenet.prediction.found_clearances import find_clearances_in_survey
 from scenenet.prediction.found_line import WireSearch
@@ -110,6 +116,25 @@ def test_points_of_wires_that_were_not_traced_are_no_obstacles(survey, wires):
     for place in found.places:
         near = np.linalg.norm(on_wire - (place.x, place.y, place.z), axis=1).min()
         assert near > 0.01
+
+
+def test_points_in_voxels_of_wires_at_a_tower_are_no_obstacles(survey, wires):
+    _, spool, line = survey
+    span = next(s for s in line.spans if s.from_tower and s.to_tower)
+    frame = SpanFrame.between(np.array(span.start), np.array(span.end))
+    x, y = span.start
+    profile = Profile(0.0, 0.0, 0.3, 0.3, 15.0, 1.0, 1.0)
+    ground, along = Ground(0.0, np.zeros(2)), np.array([0.0, 1.0])
+    tower = Structure(x, y, ground, 15.0, 0.5, along, profile, 1.0, NO_HEAD, ())
+
+    def nearest_wire(structures: Structures) -> float:
+        """m, planar distance from the tower of the nearest point in a voxel of a wire."""
+        look_up = AreaLookUp(spool, structures, wires, classes=False)
+        found = look_up.obstacles(Area(frame, 0.0, span.length, 20.0))
+        return float(np.hypot(*(found.xyz[found.wire][:, :2] - (x, y)).T).min())
+
+    assert nearest_wire(Structures(())) < tower.reach + JUMPER_M
+    assert nearest_wire(Structures(((1, tower),))) > tower.reach + JUMPER_M
 
 
 def test_the_table_has_a_row_for_each_span_the_worst_first(found, survey, tmp_path):

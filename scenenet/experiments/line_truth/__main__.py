@@ -9,23 +9,23 @@ those of the survey. Prints two Markdown tables.
 
 from __future__ import annotations
 
-import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.errors import InputError
 from scenenet.core.scratch import scratch_folder
 from scenenet.detection.settings import DetectionSettings
 from scenenet.experiments.line_truth import clearances, conductors
-from scenenet.models.packaged import WIRES, packaged_model
+from scenenet.experiments.wire_options import wire_parser
+from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.reading import read
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.synthetic.corridor import Corridor
-from scenenet.synthetic.settings import Kind, SyntheticSettings
+from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.synthetic.survey import make_survey
 
 POLES: Mapping[str, Any] = {"density": 20.0}
@@ -73,16 +73,7 @@ def run(
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; its exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m scenenet.experiments.line_truth",
-        description=__doc__.splitlines()[0] if __doc__ else None,
-    )
-    parser.add_argument(
-        "--model",
-        type=Path,
-        default=packaged_model(WIRES),
-        help="model of wires (default: that of the package)",
-    )
+    parser = wire_parser("line_truth", __doc__)
     parser.add_argument("--towers", type=int, default=24, help="towers of a line (default 24)")
     parser.add_argument("--seed", type=int, default=5, help="of the surveys (default 5)")
     parser.add_argument("--voltage", type=float, default=66, help="kV, of the limits (default 66)")
@@ -93,7 +84,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="share of towers on straight stretches that end their conductors; bends do then too "
         "(default 0)",
     )
-    parser.add_argument("--kinds", nargs="+", choices=get_args(Kind), default=get_args(Kind))
     chosen = parser.parse_args(arguments)
     try:
         with scratch_folder() as folder:

@@ -73,7 +73,7 @@ TABLES: Mapping[str, Callable[[], str]] = {
     "spans": columns_of("scenenet.line.records", "SPAN_COLUMNS"),
     "conductors": columns_of("scenenet.line.records", "CONDUCTOR_COLUMNS"),
     "supports": columns_of("scenenet.line.records", "SUPPORT_COLUMNS"),
-    "line notes": columns_of("scenenet.line.records", "NOTE_COLUMNS"),
+    "line notes": columns_of("scenenet.line.notes", "NOTE_COLUMNS"),
     "clearances by span": columns_of("scenenet.clearance.records", "SPAN_CLEARANCE_COLUMNS"),
     "clearances": columns_of("scenenet.clearance.records", "CLEARANCE_COLUMNS"),
     "fall trees": columns_of("scenenet.clearance.records", "TREE_COLUMNS"),

@@ -10,7 +10,7 @@ import numpy as np
 from scenenet.detection.conductor_rules import FAR, WIDE, WIDEST_HEAD_M
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
-from scenenet.line.records import FOUND_AGAIN, UNHELD, LineNote
+from scenenet.line.notes import NOTE_KINDS, LineNote
 from scenenet.pointcloud.units import METRE, SYMBOLS
 
 WIDEST_ARM = WIDE * float(DetectionSettings.model_fields["crossarm"].default)
@@ -34,12 +34,6 @@ AS_USUAL = 0.3
 
 BESIDE_M = 10.0
 """m between two towers below which they may be one."""
-
-BY_LINE = {
-    UNHELD: "no conductor that was traced leads to it",
-    FOUND_AGAIN: "it was found only when it was looked for where the line expects a tower",
-}
-"""What a note of the line says about a tower -> the reason to check it."""
 
 
 class Units(NamedTuple):
@@ -117,16 +111,28 @@ def survey_doubts(
     """
     units = Units(*unit_sizes[1:], *unit_names[1:])
     heights, neighbours = _unusual_heights(towers, units), _neighbours(towers, units.planar_m)
-    of_line = {note.tower: BY_LINE[note.what] for note in notes if note.what in BY_LINE}
+    of_line = _of_line(notes)
     return [
         (
             *doubts(tower, tau, unit_sizes, unit_names),
             *height,
             *neighbour,
-            *([of_line[tower.id]] if tower.id in of_line else []),
+            *of_line.get(tower.id, ()),
         )
         for tower, height, neighbour in zip(towers, heights, neighbours, strict=True)
     ]
+
+
+def _of_line(notes: Iterable[LineNote]) -> dict[int, list[str]]:
+    """Id of a tower -> what the line says about it, each reason once."""
+    found: dict[int, list[str]] = {}
+    for note in notes:
+        reason = NOTE_KINDS[note.what].of_tower
+        for tower in note.towers if reason else ():
+            own = found.setdefault(tower, [])
+            if reason not in own:
+                own.append(reason)
+    return found
 
 
 def doubt_rank(reasons: Sequence[str], probability: float) -> tuple[int, float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.geneo import kernel_named
 from scenenet.interpretability.doubts import Units, survey_doubts
-from scenenet.line.records import LineNote
+from scenenet.line.notes import LineNote
 from scenenet.models.base import VoxelModel
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet

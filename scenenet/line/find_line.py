@@ -11,16 +11,11 @@ from scenenet.detection.tower_ids import tower_ids
 from scenenet.line.catenary import Catenary
 from scenenet.line.graph import Chain, chains
 from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan
-from scenenet.line.records import (
-    EXPECTED,
-    UNHELD,
-    Conductor,
-    LineNote,
-    LineSpan,
-    SurveyLine,
-)
+from scenenet.line.notes import EXPECTED, UNHELD, UNTRACED, LineNote
+from scenenet.line.records import Conductor, LineSpan, SurveyLine
 from scenenet.line.spans import find_spans
 from scenenet.line.supports import supports
+from scenenet.line.untraced import untraced_spans
 from scenenet.line.wire_points import WirePoints
 
 PHASES = 3
@@ -109,8 +104,19 @@ def find_line(
     notes += [
         LineNote(tower.x, tower.y, UNHELD, tower.id, 0) for tower in towers if tower.id not in held
     ]
+    gaps = untraced_spans(towers, spans)
+    notes += gaps
+    spans = [_before_a_gap(span, gaps) for span in spans]
     held_by = supports(towers, spans, conductors)
     return SurveyLine(tuple(spans), tuple(conductors), tuple(notes), tuple(held_by))
+
+
+def _before_a_gap(span: LineSpan, gaps: Sequence[LineNote]) -> LineSpan:
+    """The span, with what is known of its ends if no next one was traced."""
+    ends = {tower for gap in gaps for tower in gap.towers} & {span.from_tower, span.to_tower}
+    if not ends or not span.line or span.ends == EXPECTED:
+        return span
+    return replace(span, ends=UNTRACED)
 
 
 def _is_cable(spans: Sequence[TracedSpan], slack: float) -> bool:

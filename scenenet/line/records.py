@@ -9,6 +9,7 @@ from typing import Any, Self
 
 from scenenet.core.columns import Record, column, columns_of
 from scenenet.line.catenary import Catenary
+from scenenet.line.notes import LineNote
 
 AS_FLOWN = (
     "as flown: positions at the temperature, load and wind of the flight, not at other temperatures"
@@ -116,8 +117,8 @@ class LineSpan(Record):
     earth_wires: int = column("", "earth wires", heading="earth wires")
     worst_rmse: float = column("m", "largest RMSE of its conductors", heading="worst RMSE")
     ends: str = column(
-        "", "what is known of its ends: between towers, leaves the survey, tower expected, or "
-        "cable", heading="ends",
+        "", "what is known of its ends: between towers, leaves the survey, tower expected, span "
+        "expected, or cable", heading="ends",
     )  # fmt: skip
     positions: str = positions_column()
 
@@ -125,21 +126,6 @@ class LineSpan(Record):
     def from_json(cls, data: Mapping[str, Any]) -> Self:
         """What ``to_json`` gave."""
         return cls(**{**data, "start": tuple(data["start"]), "end": tuple(data["end"])})
-
-
-@dataclass(frozen=True)
-class LineNote(Record):
-    """A place that a person should look at. ``NOTE_COLUMNS`` says what each column is."""
-
-    x: float = column("m", "easting", heading="x")
-    y: float = column("m", "northing", heading="y")
-    what: str = column(
-        "", "tower expected; tower without a conductor; tower found where the line expected one; "
-        "or tower dropped, which conductors pass without a bend",
-        heading="what",
-    )  # fmt: skip
-    tower: int = column("", "id of the tower there, 0 for none", heading="tower")
-    span_id: int = column("", "number of the span that says it, 0 for none", heading="span")
 
 
 @dataclass(frozen=True)
@@ -168,11 +154,6 @@ class Support(Record):
     )
 
 
-EXPECTED, UNHELD = "tower expected", "tower without a conductor"
-FOUND_AGAIN = "tower found where the line expected one"
-PASSED = "tower dropped: conductors pass it without a bend"
-"""What the line says of a place."""
-
 CONDUCTOR_COLUMNS = columns_of(Conductor)
 """Every column of the list of conductors, in order."""
 
@@ -182,9 +163,6 @@ SPAN_COLUMNS = columns_of(LineSpan)
 SUPPORT_COLUMNS = columns_of(Support)
 """Every column of the list of towers of lines, in order."""
 
-NOTE_COLUMNS = columns_of(LineNote)
-"""Every column of the list of places to look at, in order."""
-
 
 @dataclass(frozen=True)
 class SurveyLine:
@@ -193,7 +171,7 @@ class SurveyLine:
     Attributes:
         spans: line by line, each in order.
         conductors: span by span.
-        notes: places to look at: expected towers, and towers without a conductor.
+        notes: places to look at.
         supports: the towers that are in a line.
     """
 

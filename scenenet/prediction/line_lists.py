@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scenenet.line.notes import NOTE_COLUMNS
 from scenenet.line.records import (
     CONDUCTOR_COLUMNS,
-    NOTE_COLUMNS,
     SPAN_COLUMNS,
     SUPPORT_COLUMNS,
     SurveyLine,

@@ -12,7 +12,7 @@ import numpy as np
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 from scenenet.detection.survey_tower import CONTRIBUTION, row_types
-from scenenet.line.records import LineNote
+from scenenet.line.notes import LineNote
 from scenenet.prediction.line_lists import NOTES
 from scenenet.prediction.summary import SUMMARY
 from scenenet.review.tables.layer import layers_of

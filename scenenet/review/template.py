@@ -1,5 +1,5 @@
-"""A review file to fill in: the places where the line expects a tower, then every tower of a list,
-the doubtful ones first."""
+"""A review file to fill in: the places at which the line and the list of towers do not agree, then
+every tower of the list, the doubtful ones first."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic
-from scenenet.line.records import EXPECTED, PASSED, LineNote
+from scenenet.line.notes import LineNote
 from scenenet.prediction.tower_lists import arrays, write_layer
 from scenenet.review.decisions import LAYER
 from scenenet.review.doubts import Doubted, by_doubt
@@ -40,7 +40,7 @@ def write_template(path: Path, found: FoundList) -> list[Doubted]:
     if path.suffix.lower() not in (".csv", ".gpkg"):
         raise InputError("a review file is a .csv or .gpkg file", file=path)
     doubted = by_doubt(found)
-    places = [note for note in found.notes if note.what in WITHOUT_TOWER]
+    places = [note for note in found.notes if note.of_place]
     rows = [*map(_of_place, places), *map(_row, doubted)]
     with atomic(path) as partial:
         if path.suffix.lower() == ".csv":
@@ -55,16 +55,9 @@ def write_template(path: Path, found: FoundList) -> list[Doubted]:
     return doubted
 
 
-WITHOUT_TOWER = {
-    EXPECTED: "conductors end here: a tower is expected",
-    PASSED: "a tower was dropped here: conductors pass without a bend",
-}
-"""What the line says of places that have no tower of the list -> why to look there."""
-
-
 def _of_place(note: LineNote) -> dict[str, Any]:
     """A row without an id; a person who sees a tower there writes ``add``."""
-    return {**dict.fromkeys(COLUMNS), "doubts": WITHOUT_TOWER[note.what], "x": note.x, "y": note.y}
+    return {**dict.fromkeys(COLUMNS), "doubts": note.of_place, "x": note.x, "y": note.y}
 
 
 def _row(doubted: Doubted) -> dict[str, Any]:

@@ -18,7 +18,8 @@ from scenenet.experiments.components import run as components
 from scenenet.experiments.components.summary import summarise_components
 from scenenet.experiments.cross_validation.run import COLUMNS
 from scenenet.experiments.cross_validation.summary import summarise_folds
-from scenenet.line.records import CONDUCTOR_COLUMNS, NOTE_COLUMNS, SPAN_COLUMNS, SUPPORT_COLUMNS
+from scenenet.line.notes import NOTE_COLUMNS
+from scenenet.line.records import CONDUCTOR_COLUMNS, SPAN_COLUMNS, SUPPORT_COLUMNS
 from scenenet.prediction.point_dimensions import LINE_DIMENSIONS
 
 

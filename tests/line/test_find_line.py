@@ -12,7 +12,8 @@ from fixtures.line_scene import KnownLine, points_on
 from scenenet.line.catenary import Catenary
 from scenenet.line.find_line import find_line
 from scenenet.line.hung import STEEP, LineTower
-from scenenet.line.records import UNHELD, SurveyLine
+from scenenet.line.notes import UNHELD, UNTRACED
+from scenenet.line.records import SurveyLine
 from scenenet.line.wire_points import WirePoints
 
 
@@ -99,6 +100,36 @@ def test_a_missed_tower_is_expected_where_it_stands(pylons):
     expected = [note for note in line.notes if note.what == "tower expected"]
     apart = [np.hypot(note.x - missed.x, note.y - missed.y) for note in expected]
     assert min(apart) < 10.0
+
+
+def test_a_span_that_was_not_traced_between_two_towers_is_listed(known):
+    """The scanner, or the observer, missed all wires of one span."""
+    first, last = known.towers[2:4]
+    gone = [c for c in known.inner if {c.from_tower, c.to_tower} == {first.id, last.id}]
+    missed = np.zeros(len(known.xyz), bool)
+    for conductor in gone:
+        s, _ = conductor.catenary.along(known.xyz)
+        missed |= (s > 0) & (s < conductor.catenary.length)
+    points = WirePoints(known.xyz[~missed], np.ones((~missed).sum(), bool))
+    line = find_line(points, known.towers, known.to_its_ends)
+    [gap] = line.notes
+    assert (gap.what, {gap.tower, gap.to_tower}) == (UNTRACED, {first.id, last.id})
+    assert (gap.x, gap.y) == pytest.approx(tuple((first.place + last.place) / 2))
+    beside = [s for s in line.spans if {s.from_tower, s.to_tower} & {first.id, last.id}]
+    assert [span.ends for span in beside] == [UNTRACED, UNTRACED]
+    assert gap.span_id in {span.span_id for span in beside}
+
+
+def test_a_last_span_that_was_not_traced_is_listed(poles):
+    *_, before, last = poles.towers
+    way = last.place - before.place
+    there = (poles.xyz[:, :2] - before.place) @ way > 0
+    points = WirePoints(poles.xyz[~there], np.ones((~there).sum(), bool))
+    line = find_line(points, poles.towers, poles.to_its_ends)
+    assert {n.what: {*n.towers} for n in line.notes} == {
+        UNHELD: {last.id},
+        UNTRACED: {before.id, last.id},
+    }
 
 
 def test_a_tower_beside_the_line_has_no_conductor(pylons):

@@ -14,7 +14,8 @@ from scenenet.clearance.records import SurveyClearances
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.detection.settings import DetectionSettings
 from scenenet.line.frame import SpanFrame
-from scenenet.line.records import EXPECTED, LineNote, SurveyLine
+from scenenet.line.notes import EXPECTED, LineNote
+from scenenet.line.records import SurveyLine
 from scenenet.prediction.page.pictures import tower_pictures
 from scenenet.prediction.page.span_pictures import PICTURED, span_pictures
 from scenenet.prediction.page.survey_page import PageContent, survey_page, write_page

@@ -13,11 +13,13 @@ import line_pictures
 import numpy as np
 import pyogrio
 import pytest
+import shapely
 from fixtures import scenes
 
 from scenenet.clearance.settings import ClearanceSettings, SpanSag
 from scenenet.detection.settings import DetectionSettings
-from scenenet.line.records import AS_FLOWN, FOUND_AGAIN, PASSED
+from scenenet.line.notes import FOUND_AGAIN, NOTE_KINDS, PASSED, UNTRACED
+from scenenet.line.records import AS_FLOWN
 from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import TowerSearch, find_in_survey
 from scenenet.prediction.predict import predict_survey
@@ -107,6 +109,33 @@ def test_a_tree_that_was_taken_for_a_tower_is_dropped_and_its_place_listed(
     assert [(note.x, note.y, note.tower) for note in notes] == [(*middle, 0)]
     spans = {(span.from_tower, span.to_tower) for span in again.line.spans}
     assert spans == {(span.from_tower, span.to_tower) for span in whole.line.spans}
+
+
+def test_a_span_without_wire_points_is_in_every_list(line, model, wire_finder, tmp_path):
+    """The scanner saw no wire between the first two poles, and the wire beyond both."""
+    survey = laspy.read(line)
+    x = np.asarray(survey.x) - scenes.PLACE[0]
+    between = (x > scenes.POLES_X[0]) & (x < scenes.POLES_X[1])
+    survey.points = survey.points[~(between & (np.asarray(survey.classification) == 16))]
+    path = tmp_path / "line.laz"
+    survey.write(path)
+    files = PredictionFiles.of(path, tmp_path / "found", line=True)
+    predict_to_files(path, [model, wire_finder], files, PredictSettings(), LONE_POLES)
+    poles = [row["id"] for row in sorted(rows(files.table), key=lambda row: float(row["x"]))[:2]]
+    spans = rows(files.line_tables[0])
+    ends = {row["span_id"] for row in spans if {row["from_tower"], row["to_tower"]} & {*poles}}
+    assert {row["span_id"] for row in spans if row["ends"] == UNTRACED} == ends
+    assert len(ends) == 2
+    facts, _, geometry, values = pyogrio.raw.read(files.geopackage, layer="line_notes")
+    notes = dict(zip(facts["fields"], values, strict=True))
+    [row] = np.flatnonzero(notes["what"] == UNTRACED)
+    assert {str(notes["tower"][row]), str(notes["to_tower"][row])} == {*poles}
+    middle = np.mean(scenes.POLES_X[:2]) + scenes.PLACE[0], scenes.PLACE[1] + 15.5
+    place = shapely.from_wkb(geometry[row])
+    assert (place.x, place.y) == pytest.approx(middle, abs=1.0)
+    page = files.page.read_text(encoding="utf-8")
+    assert 'class="look untraced ring"' in page
+    assert NOTE_KINDS[UNTRACED].of_span in page
 
 
 def test_each_point_of_the_wire_has_its_span_and_no_other_point_has_one(predicted, line):

@@ -10,7 +10,8 @@ import pytest
 
 from scenenet.clearance.records import Clearance, SpanClearance, SurveyClearances
 from scenenet.line.catenary import Catenary
-from scenenet.line.records import EXPECTED, Conductor, LineNote, LineSpan, SurveyLine
+from scenenet.line.notes import EXPECTED, UNTRACED
+from scenenet.line.records import Conductor, LineSpan, SurveyLine
 from scenenet.prediction.page.span_facts import CHECK, DANGER, FOUND, span_facts
 from scenenet.prediction.page.span_list import LengthUnits, span_rows
 from scenenet.prediction.page.span_pictures import PICTURED, SpanPicture
@@ -59,22 +60,29 @@ def row(number: int) -> SpanClearance:
     )  # fmt: skip
 
 
-def facts(spans, conductors, notes=(), places=(), order=()):
-    line = SurveyLine(tuple(spans), tuple(conductors), tuple(notes))
+def facts(spans, conductors, places=(), order=()):
+    line = SurveyLine(tuple(spans), tuple(conductors), ())
     near = SurveyClearances(tuple(places), (), tuple(row(n) for n in order), (), "", "")
     return span_facts(line, near, (1.0, "metre"))
 
 
 def test_each_reason_to_look_at_a_span_is_named():
-    spans = [span(1), span(2), span(3, conductors=2), span(4), span(5)]
+    spans = [
+        span(1),
+        span(2, ends=EXPECTED),
+        span(3, conductors=2),
+        span(4),
+        span(5, ends=UNTRACED),
+    ]
     wires = [conductor(n) for n in (1, 2, 3)]
     wires += [conductor(4, rmse=0.4), conductor(5, seen=0.3, conductor_id=2)]
-    found = facts(spans, wires, [LineNote(200.0, 0.0, EXPECTED, 0, 2)])
+    found = facts(spans, wires)
     reasons = {one.span.span_id: " ".join(one.doubts) for one in found}
     assert reasons[1] == ""
     assert "a tower is expected" in reasons[2]
     assert "2 conductors, and most spans of its line have 3" in reasons[3]
     assert "conductor 1 are 0.40 m" in reasons[4]
+    assert "no span was traced" in reasons[5]
     assert "conductor 2: points on less than half" in reasons[5]
     assert {one.state for one in found if one.doubts} == {CHECK}
 

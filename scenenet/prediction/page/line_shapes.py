@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from html import escape
 
 import numpy as np
 
 from scenenet.clearance.records import SurveyClearances
-from scenenet.line.records import EXPECTED, FOUND_AGAIN, PASSED, UNHELD, Conductor, SurveyLine
+from scenenet.line.notes import NOTE_KINDS, UNTRACED, NoteKind
+from scenenet.line.records import Conductor, SurveyLine
 from scenenet.prediction.page.budget import MOST_MARKS
 from scenenet.prediction.page.frame import MapFrame
 from scenenet.prediction.page.span_facts import SpanFacts
@@ -17,9 +19,6 @@ BLOWN_M = 0.05
 
 BENDS = 8
 """Pieces of such a curve."""
-
-RINGS = "expected", "again", "unheld"
-"""Marks that are rings."""
 
 KINDS = {"conductor": "wire", "earth wire": "wire earth", "cable": "wire cable"}
 """Kind of a wire -> class of its path."""
@@ -50,21 +49,33 @@ def line_shapes(
     free = [
         place
         for span in line.spans
-        if span.ends == "leaves the survey"
+        if span.ends in ("leaves the survey", UNTRACED)
         for place, tower in ((span.start, span.from_tower), (span.end, span.to_tower))
         if not tower
     ]
-    for name, places in (
-        ("fall", trees),
-        ("danger", dangers),
-        ("outside", free),
-        ("expected", [(n.x, n.y) for n in line.notes if n.what == EXPECTED]),
-        ("again", [(n.x, n.y) for n in line.notes if n.what == FOUND_AGAIN]),
-        ("unheld", [(n.x, n.y) for n in line.notes if n.what == UNHELD]),
-        ("passed", [(n.x, n.y) for n in line.notes if n.what == PASSED]),
-    ):
-        shapes += _marks(name, places, frame, planar)
+    for name, places in (("fall", trees), ("danger", dangers), ("outside", free)):
+        shapes += _marks([name], places, frame, planar)
+    for what, kind in NOTE_KINDS.items():
+        places = [(note.x, note.y) for note in line.notes if note.what == what]
+        shapes += _marks(_ring(kind), places, frame, planar)
     return shapes
+
+
+def note_key() -> str:
+    """What the key of the map says of each kind of places to look at, as HTML."""
+    items = []
+    for what, kind in NOTE_KINDS.items():
+        side = 20 if kind.at_tower else 16
+        paths = "".join(f'<path class="{n}" d="M{side // 2} {side // 2}h0"/>' for n in _ring(kind))
+        svg = f'<svg width="{side}" height="{side}" aria-hidden="true">{paths}</svg>'
+        items.append(f"    <li>{svg} {escape(what)}</li>")
+    return "\n".join(items)
+
+
+def _ring(kind: NoteKind) -> list[str]:
+    """Classes of a ring: of what lies below, and of what lies on it."""
+    name = f"look at-tower {kind.mark}" if kind.at_tower else f"look {kind.mark}"
+    return [f"{name} ring", name]
 
 
 def _span(facts: SpanFacts, frame: MapFrame, planar: float) -> str:
@@ -82,12 +93,11 @@ def _wires(wires: Iterable[Conductor], frame: MapFrame, planar: float) -> str:
 
 
 def _marks(
-    name: str, places: Sequence[tuple[float, float]], frame: MapFrame, planar: float
+    names: Sequence[str], places: Sequence[tuple[float, float]], frame: MapFrame, planar: float
 ) -> list[str]:
-    """Marks that do not grow with the map: strokes without length, whose caps show. A wider one
-    below makes a ring of the upper one."""
+    """Marks that do not grow with the map: strokes without length, whose caps show. One of each
+    class of ``names`` lies on the one before."""
     if not places:
         return []
     path = "".join(f"M{frame.place(x / planar, y / planar)}h0" for x, y in places)
-    ring = [f'<path class="{name} ring" d="{path}"/>'] if name in RINGS else []
-    return [*ring, f'<path class="{name}" d="{path}"/>']
+    return [f'<path class="{name}" d="{path}"/>' for name in names]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from scenenet.clearance.records import Clearance, FallTree, SpanClearance, SurveyClearances
-from scenenet.line.records import EXPECTED, Conductor, LineNote, LineSpan, SurveyLine
+from scenenet.line.notes import NOTE_KINDS
+from scenenet.line.records import Conductor, LineSpan, SurveyLine
 from scenenet.pointcloud.units import SYMBOLS
 
 ROUGH_M = 0.15
@@ -21,7 +22,7 @@ LITTLE = 0.5
 DANGER, CHECK, FOUND = STATES = ("danger", "check", "found")
 """What is known of a span: something is too near, there is a reason to doubt it, or neither."""
 
-Row = TypeVar("Row", Conductor, Clearance, FallTree, LineNote)
+Row = TypeVar("Row", Conductor, Clearance, FallTree)
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def span_facts(
     Args:
         planar: size in m of the unit of x and y of the survey, and its name.
     """
-    conductors, notes = _by_span(line.conductors), _by_span(line.notes)
+    conductors = _by_span(line.conductors)
     usual = _usual_conductors(line.spans)
     rows = {} if clearances is None else {row.span_id: row for row in clearances.spans}
     places = _by_span(() if clearances is None else clearances.places)
@@ -82,7 +83,7 @@ def span_facts(
                 span, tuple(own), rows.get(span.span_id), _nearest(near),
                 tuple(place for place in near if place.what == "danger"),
                 tuple(trees[span.span_id]),
-                _doubts(span, own, notes[span.span_id], usual.get(span.line), planar),
+                _doubts(span, own, usual.get(span.line), planar),
             )
         )  # fmt: skip
     rank = {span_id: number for number, span_id in enumerate(rows)}
@@ -119,17 +120,13 @@ def _usual_conductors(spans: Sequence[LineSpan]) -> dict[int, int]:
 def _doubts(
     span: LineSpan,
     conductors: Sequence[Conductor],
-    notes: Sequence[LineNote],
     usual: int | None,
     planar: tuple[float, str],
 ) -> tuple[str, ...]:
     size, unit = planar[0], SYMBOLS.get(planar[1], planar[1])
     reasons = []
-    if any(note.what == EXPECTED for note in notes):
-        reasons.append(
-            "its conductors end where the survey goes on: a tower is expected there that was not "
-            "found"
-        )
+    if span.ends in NOTE_KINDS:
+        reasons.append(NOTE_KINDS[span.ends].of_span)
     if usual is not None and span.line and span.conductors != usual:
         reasons.append(
             f"it has {span.conductors} conductors, and most spans of its line have {usual}"

@@ -18,6 +18,7 @@ from scenenet.pointcloud.units import SYMBOLS
 from scenenet.prediction.page import markup
 from scenenet.prediction.page.budget import PageBudget
 from scenenet.prediction.page.frame import MapFrame
+from scenenet.prediction.page.line_shapes import note_key
 from scenenet.prediction.page.map_shapes import frame_and_shapes
 from scenenet.prediction.page.pictures import TowerPicture, tower_pictures
 from scenenet.prediction.page.span_facts import SpanFacts, span_facts
@@ -182,6 +183,7 @@ def _line_parts(content: PageContent, units: LengthUnits, positions: str) -> dic
         "headings": span_headings(units),
         "rows": span_rows(content.spans, units),
         "caveat": escape(positions),
+        "notes": note_key(),
     }
     return {f"line_{name}": _template(f"line_{name}.html").substitute(values) for name in names}
 

@@ -105,18 +105,14 @@ def find_line(
         LineNote(tower.x, tower.y, UNHELD, tower.id, 0) for tower in towers if tower.id not in held
     ]
     gaps = untraced_spans(towers, spans)
-    notes += gaps
-    spans = [_before_a_gap(span, gaps) for span in spans]
+    notes += [gap.note for gap in gaps]
+    at_gap = {span_id for gap in gaps for span_id in gap.span_ids}
+    spans = [
+        replace(span, ends=UNTRACED) if span.span_id in at_gap and span.ends != EXPECTED else span
+        for span in spans
+    ]
     held_by = supports(towers, spans, conductors)
     return SurveyLine(tuple(spans), tuple(conductors), tuple(notes), tuple(held_by))
-
-
-def _before_a_gap(span: LineSpan, gaps: Sequence[LineNote]) -> LineSpan:
-    """The span, with what is known of its ends if no next one was traced."""
-    ends = {tower for gap in gaps for tower in gap.towers} & {span.from_tower, span.to_tower}
-    if not ends or not span.line or span.ends == EXPECTED:
-        return span
-    return replace(span, ends=UNTRACED)
 
 
 def _is_cable(spans: Sequence[TracedSpan], slack: float) -> bool:

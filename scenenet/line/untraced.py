@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,13 +25,30 @@ LONGER = 1.5
 """Length of a gap over the longest span of its line, at most. What is longer is seldom one span."""
 
 
+STRAY = 0.5
+"""Share of the conductors of the fullest span at a tower below which another one does not continue
+it: a tower holds as many on both sides, and what is traced into the air amid trees is fewer."""
+
+
+class Gap(NamedTuple):
+    """Where a span is expected.
+
+    Attributes:
+        note: that says so.
+        span_ids: of the spans that end there.
+    """
+
+    note: LineNote
+    span_ids: frozenset[int]
+
+
 @dataclass(frozen=True)
 class _DeadEnd:
-    """A tower that holds one span of a line.
+    """A tower from which a line does not go on.
 
     Attributes:
         tower: at which the line ends.
-        span: that it holds.
+        span: that ends there.
         onward: (2,) unit vector in which the line would go straight on.
         reach: m, longest gap after it.
     """
@@ -48,8 +66,8 @@ class _DeadEnd:
         return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
 
 
-def untraced_spans(towers: Sequence[LineTower], spans: Sequence[LineSpan]) -> list[LineNote]:
-    """A note for each gap in a line, in its middle.
+def untraced_spans(towers: Sequence[LineTower], spans: Sequence[LineSpan]) -> list[Gap]:
+    """The gaps in the lines; the place of each is its middle.
 
     Either both towers end a line and face each other, or one does, and the other tower stands ahead
     of it: the line may end there, or another one may pass.
@@ -59,7 +77,7 @@ def untraced_spans(towers: Sequence[LineTower], spans: Sequence[LineSpan]) -> li
         spans: of its lines.
     """
     ends = {end.tower.id: end for end in _dead_ends(towers, spans)}
-    noted: dict[frozenset[int], LineNote] = {}
+    noted: dict[frozenset[int], Gap] = {}
     for end in ends.values():
         best = min(
             (
@@ -72,12 +90,12 @@ def untraced_spans(towers: Sequence[LineTower], spans: Sequence[LineSpan]) -> li
         )
         if best is not None and not _divided(end.tower, best[2], towers):
             pair = frozenset({end.tower.id, best[2].id})
-            noted.setdefault(pair, _note(end, best[2]))
+            noted.setdefault(pair, _gap(end, best[2], ends.get(best[2].id) if best[0] else None))
     return list(noted.values())
 
 
 def _dead_ends(towers: Sequence[LineTower], spans: Sequence[LineSpan]) -> list[_DeadEnd]:
-    """The towers that hold one span, in the order of the spans."""
+    """The towers from which a line does not go on, in the order of the spans."""
     by_id = {tower.id: tower for tower in towers}
     at: dict[int, list[LineSpan]] = {}
     longest: dict[int, float] = {}
@@ -88,8 +106,10 @@ def _dead_ends(towers: Sequence[LineTower], spans: Sequence[LineSpan]) -> list[_
                 at.setdefault(tower, []).append(span)
     found = []
     for tower, own in at.items():
-        if len(own) == 1:
-            [span] = own
+        enough = STRAY * max(span.conductors for span in own)
+        full = [span for span in own if span.conductors >= enough]
+        if len(full) == 1:
+            [span] = full
             way = np.subtract(span.end, span.start) * (1 if span.to_tower == tower else -1)
             onward = way / np.linalg.norm(way)
             found.append(_DeadEnd(by_id[tower], span, onward, LONGER * longest[span.line]))
@@ -124,6 +144,7 @@ def _divided(first: LineTower, last: LineTower, towers: Sequence[LineTower]) -> 
     return bool(((np.abs(t) <= BETWEEN_M) & (s > BETWEEN_M) & (s < length - BETWEEN_M)).any())
 
 
-def _note(end: _DeadEnd, tower: LineTower) -> LineNote:
+def _gap(end: _DeadEnd, tower: LineTower, other: _DeadEnd | None) -> Gap:
     x, y = ((end.tower.place + tower.place) / 2).tolist()
-    return LineNote(x, y, UNTRACED, end.tower.id, end.span.span_id, tower.id)
+    note = LineNote(x, y, UNTRACED, end.tower.id, end.span.span_id, tower.id)
+    return Gap(note, frozenset(e.span.span_id for e in (end, other) if e is not None))

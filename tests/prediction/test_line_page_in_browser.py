@@ -88,6 +88,7 @@ def write_many(prediction: SurveyPrediction, path: Path) -> None:
         places += [replace(place, span_id=1000 + n, x=place.x + x - held.start[0]) for place in own]
         [row] = [row for row in found.spans if row.span_id == held.span_id]
         rows.append(replace(row, span_id=1000 + n, order=n + 1))
+    spans[40] = replace(spans[40], ends=EXPECTED)
     notes = (LineNote(*spans[40].start, EXPECTED, 0, spans[40].span_id),)
     large = replace(
         prediction, towers=tuple(towers), line=SurveyLine(tuple(spans), tuple(wires), notes),

@@ -168,6 +168,12 @@ class Config(Settings):
         "evenly from those of the split, so that the studies of a large dataset take less time; "
         "null for all of them",
     )
+    study_seeds: int | None = Field(
+        None,
+        ge=1,
+        description="most seeds of a study, the first ones of its list, so that studies take less "
+        "time; null for all of them",
+    )
     studies: tuple[StudySettings, ...] = Field(
         (),
         description="series of short trainings that differ in one setting; see config/studies.yaml",
@@ -207,15 +213,18 @@ class Config(Settings):
 
     @model_validator(mode="after")
     def _chosen_studies(self) -> Self:
-        """Leave out the studies that are not to be run."""
-        if self.only_studies is None:
-            return self
+        """Leave out the studies and the seeds that are not to be run."""
         names = [study.name for study in self.studies]
-        if unknown := [name for name in self.only_studies if name not in names]:
+        only = names if self.only_studies is None else self.only_studies
+        if unknown := [name for name in only if name not in names]:
             raise ValueError(
                 f"only_studies: {', '.join(unknown)} is none of the studies: {', '.join(names)}"
             )
-        chosen = tuple(study for study in self.studies if study.name in self.only_studies)
+        chosen = tuple(
+            study.model_copy(update={"seeds": study.seeds[: self.study_seeds]})
+            for study in self.studies
+            if study.name in only
+        )
         object.__setattr__(self, "studies", chosen)
         return self
 

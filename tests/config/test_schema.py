@@ -86,17 +86,27 @@ def test_the_full_configuration_is_chapter_5_at_its_own_scale(project_root):
     assert config.study_named("learning-rate").vary["training.learning_rate"][0] == 0.1
 
 
+STUDY = {"title": "t", "place": "p", "asks": "a", "variants": [{"name": "v"}]}
+
+
 def test_only_the_named_studies_are_run():
-    defined = [
-        {"name": name, "title": "t", "place": "p", "asks": "a", "variants": [{"name": "v"}]}
-        for name in ("first", "second", "third")
-    ]
+    defined = [{**STUDY, "name": name} for name in ("first", "second", "third")]
     config = load(raw(studies=defined, only_studies=["third", "first"]))
     assert [study.name for study in config.studies] == ["first", "third"]
     # The resolved settings are a configuration of the same run.
     assert load(config.plain()).studies == config.studies
     with pytest.raises(InputError, match="only_studies: fourth is none of the studies: first"):
         load(raw(studies=defined, only_studies=["fourth"]))
+
+
+def test_studies_have_at_most_the_seeds_that_the_settings_allow():
+    defined = [
+        {**STUDY, "name": "many", "seeds": [5, 3, 1, 0]},
+        {**STUDY, "name": "few", "seeds": [7]},
+    ]
+    config = load(raw(studies=defined, study_seeds=2))
+    assert [study.seeds for study in config.studies] == [(5, 3), (7,)]
+    assert load(config.plain()).studies == config.studies
 
 
 def test_values_for_studies_replace_only_what_a_study_sets():

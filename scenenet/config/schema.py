@@ -145,6 +145,9 @@ class Config(Settings):
         "square crops of the training surveys with the shares of `split`",
     )
     tuning: TuningSettings = TuningSettings()
+    boosted_trees: bool = Field(
+        True, description="train and score boosted trees beside the models, as a baseline"
+    )
     score_towers: bool = Field(
         True,
         description="whether the whole towers of the test crops are scored too, and their points, "

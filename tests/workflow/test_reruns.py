@@ -16,7 +16,7 @@ CLASSIFIED = {"predict": 1, "prediction_map": 1, "review_template": 1, "report":
 PREDICTED = {**CLASSIFIED, "review": 1}
 """Jobs after a change of the best model; there is one survey to classify, which was reviewed."""
 
-SHOWN = {"figures": 1, "track": 1, "register": 1, "interactive_crop": 3}
+SHOWN = {"figures": 1, "track": 1, "register": 1, "interactive_crop": 1}
 """Jobs that show the scores of models, besides the tables and the report."""
 
 SCORED = {

@@ -275,7 +275,6 @@ VALUES = {
     "contender": [*CROSS_VALIDATED] if "cross_validation" in EXPERIMENTS else [],
     "component": [*COMPONENTS] if "components" in EXPERIMENTS else [],
     "noise_seed": list(settings.label_noise.seeds) if "label_noise" in EXPERIMENTS else [],
-    "rank": list(CROP_RANKS),
 }
 
 if not TRAIN:
@@ -297,6 +296,5 @@ wildcard_constraints:
     experiment=any_of(VALUES["experiment"]),
     contender=any_of(VALUES["contender"]),
     component=any_of(VALUES["component"]),
-    rank=any_of(VALUES["rank"]),
     seed=r"\d+",
     noise_seed=r"\d+",

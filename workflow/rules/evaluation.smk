@@ -81,30 +81,32 @@ rule inference_time:
         "../scripts/inference_time.py"
 
 
-rule boosted_trees:
-    input:
-        stores=every("voxels", "store"),
-        manifests=every("voxels", "manifest"),
-        crop_stores=every("crops", "store") if settings.score_towers else [],
-        crops=every("crops", "manifest") if settings.score_towers else [],
-        split=f"{R}/split/split.csv",
-    output:
-        scores=expand(f"{R}/boosted_trees/seed-{{seed}}.json", seed=VALUES["seed"]),
-        times=f"{R}/boosted_trees/times.json",
-        provenance=f"{R}/boosted_trees/provenance.json",
-    log:
-        f"{R}/logs/boosted_trees.log",
-    benchmark:
-        f"{R}/benchmarks/boosted_trees.tsv"
-    conda:
-        "../envs/scenenet.yaml"
-    threads: 1
-    resources:
-        mem_mb=3000,
-        runtime=120,
-    params:
-        job=job("boosted_trees", SETTINGS["detection"], seeds=list(settings.seeds)),
-    message:
-        "Training and scoring the boosted trees (baseline)"
-    script:
-        "../scripts/boosted_trees.py"
+if settings.boosted_trees:
+
+    rule boosted_trees:
+        input:
+            stores=every("voxels", "store"),
+            manifests=every("voxels", "manifest"),
+            crop_stores=every("crops", "store") if settings.score_towers else [],
+            crops=every("crops", "manifest") if settings.score_towers else [],
+            split=f"{R}/split/split.csv",
+        output:
+            scores=expand(f"{R}/boosted_trees/seed-{{seed}}.json", seed=VALUES["seed"]),
+            times=f"{R}/boosted_trees/times.json",
+            provenance=f"{R}/boosted_trees/provenance.json",
+        log:
+            f"{R}/logs/boosted_trees.log",
+        benchmark:
+            f"{R}/benchmarks/boosted_trees.tsv"
+        conda:
+            "../envs/scenenet.yaml"
+        threads: 1
+        resources:
+            mem_mb=3000,
+            runtime=120,
+        params:
+            job=job("boosted_trees", SETTINGS["detection"], seeds=list(settings.seeds)),
+        message:
+            "Training and scoring the boosted trees (baseline)"
+        script:
+            "../scripts/boosted_trees.py"

@@ -232,12 +232,12 @@ rule interactive_crop:
         manifests=every("crops", "manifest"),
         scores=each_seed_of(settings.predict.model),
     output:
-        crop=f"{R}/interactive_crop/{{rank}}.json",
-        provenance=f"{R}/interactive_crop/{{rank}}.provenance.json",
+        crops=[f"{R}/interactive_crop/{rank}.json" for rank in CROP_RANKS],
+        provenance=f"{R}/interactive_crop/provenance.json",
     log:
-        f"{R}/logs/interactive_crop/{{rank}}.log",
+        f"{R}/logs/interactive_crop.log",
     benchmark:
-        f"{R}/benchmarks/interactive_crop/{{rank}}.tsv"
+        f"{R}/benchmarks/interactive_crop.tsv"
     conda:
         "../envs/scenenet.yaml"
     threads: 1
@@ -245,14 +245,14 @@ rule interactive_crop:
         mem_mb=2000,
         runtime=10,
     params:
-        job=lambda w: job(
+        job=job(
             "interactive_crop",
             SETTINGS["detection"],
             results=results_of(models=[settings.model_named(settings.predict.model)]),
             model=settings.predict.model,
-            rank=w.rank,
+            ranks=list(CROP_RANKS),
         ),
     message:
-        "Exporting the {wildcards.rank} test crop for the 3D view"
+        "Exporting test crops for the 3D view"
     script:
         "../scripts/interactive_crop.py"

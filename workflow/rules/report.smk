@@ -30,7 +30,7 @@ rule resolved_config:
 
 rule report:
     input:
-        crops=every("interactive_crop", "crop"),
+        crops=every("interactive_crop", "crops"),
         tables=[
             *every("dataset_tables", "tables"),
             *every("tables", "tables"),

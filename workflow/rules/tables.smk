@@ -21,7 +21,7 @@ rule tables:
         ],
         studies=[*every("join_study", "runs"), *every("join_study", "times")],
         experiments=[*every("join_runs", "runs"), *every("join_runs", "times")],
-        boosted_trees=[*every("boosted_trees", "scores"), *every("boosted_trees", "times")],
+        boosted_trees=[*of_boosted_trees("scores"), *of_boosted_trees("times")],
         certificates=every("certificate", "certificate"),
         inference_time=every("inference_time", "times"),
         thesis=ancient(own_file(settings.thesis)),

@@ -42,6 +42,11 @@ def every_written_tile(w):
     ]
 
 
+def of_boosted_trees(output):
+    """An output of the boosted trees; nothing where they are not trained."""
+    return every("boosted_trees", output) if settings.boosted_trees else []
+
+
 def of_study(study, output):
     """The files of an output of the jobs of a study."""
     jobs = [job for job, (name, _) in STUDY_JOBS.items() if name == study]

@@ -45,7 +45,7 @@ rule track:
         tunings=every("tune", "tuning"),
         models=every("tune", "model"),
         scores=every("evaluate", "scores"),
-        boosted_trees=every("boosted_trees", "scores"),
+        boosted_trees=of_boosted_trees("scores"),
         observers=[
             *every("train_observer", "history"),
             *every("train_observer", "provenance"),

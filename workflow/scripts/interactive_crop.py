@@ -1,4 +1,4 @@
-"""Export one test crop for the 3D view of the report."""
+"""Export test crops for the 3D view of the report."""
 
 import _job
 from _results import results_of
@@ -8,13 +8,9 @@ def interactive_crop(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
     from scenenet.figures.interactive_crop import write_interactive_crop
 
-    write_interactive_crop(
-        results_of(job),
-        job.identity["model"],
-        job.identity["rank"],
-        job.output.crop,
-        DetectionSettings(**job.settings),
-    )
+    results, detection = results_of(job), DetectionSettings(**job.settings)
+    for rank, file in zip(job.identity["ranks"], job.output.crops, strict=True):
+        write_interactive_crop(results, job.identity["model"], rank, file, detection)
 
 
 _job.run(interactive_crop)

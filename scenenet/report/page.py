@@ -41,6 +41,7 @@ SECTIONS: Sequence[SectionMaker] = (
     crop_sections.crops,
     study_sections.studies,
     *(make for name, make in EXPERIMENT_SECTIONS.items() if name != MAIN_EXPERIMENT),
+    claim_sections.open_claims,
     claim_sections.published_numbers,
     survey_sections.predictions,
     line_sections.lines,

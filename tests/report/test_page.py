@@ -21,6 +21,8 @@ from scenenet.figures import draw_all, plan
 from scenenet.line.records import AS_FLOWN, SPAN_COLUMNS
 from scenenet.report import write_report
 from scenenet.report.blocks import NOTHING, write
+from scenenet.report.sections.claims import CLAIMS
+from scenenet.results.claims.claim import HOLDS, OPEN
 from scenenet.results.folder import Results
 from scenenet.results.score_tables import whole_towers
 from scenenet.results.tables import write_tables
@@ -209,6 +211,23 @@ def test_sections_without_results_are_left_out(thesis: Thesis, tmp_path: Path):
     sections = [section["id"] for section in read(tmp_path / "index.html").all("section")]
     assert sections == ["overview", "provenance"]
     assert "No model has been evaluated" in read(tmp_path / "index.html").text
+
+
+def test_claims_open_the_page_only_where_the_run_tells_one(page, results: Results, thesis: Thesis):
+    claims = results.folder / "tables" / "claims.csv"
+    frame = pd.DataFrame({column.name: ["", ""] for column in CLAIMS})
+
+    def sections(verdicts: list[str]) -> list[str]:
+        frame.assign(verdict=verdicts).to_csv(claims, index=False)
+        write_report(results, thesis, page)
+        return [section["id"] for section in read(page).all("section")]
+
+    assert sections([HOLDS, OPEN])[0] == "claims"
+    told_none = sections([OPEN, OPEN])
+    assert told_none[0] == "overview"
+    assert told_none.count("claims") == 1
+    assert told_none.index("claims") > told_none.index("models")
+    assert "This run tells none of the 2 claims" in read(page).text
 
 
 def test_a_survey_without_towers_says_so(page: Path, results: Results, thesis: Thesis):

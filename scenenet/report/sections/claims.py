@@ -38,9 +38,9 @@ NUMBERS = (
 
 
 def claims(context: ReportContext) -> Section | None:
-    """Every claim with its verdict, and on what data."""
+    """Every claim with its verdict, and on what data, where the run tells at least one."""
     frame = _both(context, "claims")
-    if frame is None:
+    if frame is None or _all_open(frame):
         return None
     counts = frame["verdict"].value_counts()
     facts = [("claims", str(len(frame)))]
@@ -48,10 +48,27 @@ def claims(context: ReportContext) -> Section | None:
     blocks: list[Block] = [Facts(facts)]
     if data := _data(context):
         blocks.append(Text(data))
+    blocks.append(_table(frame))
+    return Section("claims", "What the thesis claims and what holds", blocks)
+
+
+def open_claims(context: ReportContext) -> Section | None:
+    """Every claim, where the run tells none: a reader of such a run looks for other things first."""
+    frame = _both(context, "claims")
+    if frame is None or not _all_open(frame):
+        return None
+    said = f"This run tells none of the {len(frame)} claims of chapter 5. {_data(context)}".strip()
+    return Section("claims", "What the thesis claims", [Text(said), _table(frame)])
+
+
+def _all_open(frame: pd.DataFrame) -> bool:
+    return bool((frame["verdict"] == OPEN).all())
+
+
+def _table(frame: pd.DataFrame) -> Block:
     source = "tables/claims.csv, tables/claims_times.csv"
     shown = frame.astype({"remark": object}).fillna({"remark": ""})
-    blocks.append(table(shown, CLAIMS, CAPTION, source, folded=True))
-    return Section("claims", "What the thesis claims and what holds", blocks)
+    return table(shown, CLAIMS, CAPTION, source, folded=True)
 
 
 def published_numbers(context: ReportContext) -> Section | None:

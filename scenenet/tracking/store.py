@@ -38,7 +38,9 @@ EXPERIMENT_TAGS = {"mlflow.experimentKind": "custom_model_development"}
 class TrackingSettings(Settings):
     """The MLflow store."""
 
-    run: bool = Field(True, description="log every training to MLflow, and register the best models")
+    run: bool = Field(
+        True, description="log every training to MLflow, and register the best models"
+    )
     uri: str = Field(
         "sqlite:///mlflow.db",
         min_length=1,

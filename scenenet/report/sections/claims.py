@@ -53,7 +53,7 @@ def claims(context: ReportContext) -> Section | None:
 
 
 def open_claims(context: ReportContext) -> Section | None:
-    """Every claim, where the run tells none: a reader of such a run looks for other things first."""
+    """Every claim, where the run tells none. Its reader looks for other things first."""
     frame = _both(context, "claims")
     if frame is None or not _all_open(frame):
         return None

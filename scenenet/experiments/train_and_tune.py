@@ -108,7 +108,7 @@ def train_model(
     """Train a SCENE-Net or a CNN as ``train_and_tune``; if it diverges, it detects nothing."""
     begin, size = time.perf_counter(), median_voxel_size(training)
     try:
-        model, _ = fit(training, [], settings, seed)
+        model, _ = fit(training, [], settings, seed, with_evidence=False)
     except LostTraining as error:
         print(error, file=sys.stderr)
         n, seconds = new_model(settings, seed).n_parameters(), time.perf_counter() - begin

@@ -109,6 +109,7 @@ class MetricSceneNet(GeneoModel):
         self.first = first
         self.evidence: dict[str, Evidence] = {}
         self._sampled: dict[tuple[str, float], tuple[Hashable, Tensor]] = {}
+        self._decoded: dict[str, tuple[Hashable, dict[str, Tensor]]] = {}
         for label, value in self._own_fixed().items():
             name, symbol = label.rsplit(".", 1)
             parameter = next(p for p in self.parameters_of(name) if p.name == symbol)
@@ -353,7 +354,19 @@ class MetricSceneNet(GeneoModel):
         }
 
     def _shapes(self) -> Shapes:
-        return {name: self.shape_of(name) for name in self.names}
+        return {name: self._kept_shape(name) for name in self.names}
+
+    def _kept_shape(self, name: str) -> dict[str, Tensor]:
+        """``shape_of``, which without a gradient is kept: it is the same for voxels of every size,
+        and each crop may have voxels of its own size."""
+        if torch.is_grad_enabled():
+            return self.shape_of(name)
+        made_from = tuple(float(number) for number in self._stored_shape(name).values())
+        kept, shape = self._decoded.get(name, (None, {}))
+        if kept != made_from:
+            shape = self.shape_of(name)
+            self._decoded[name] = made_from, shape
+        return shape
 
     def mixing_weights(self) -> Tensor:
         """lambda, (K,), positive, sums to 1: a softmax whose last logit is 0."""

@@ -34,6 +34,8 @@ def fit_by_search(
     settings: ModelSettings,
     seed: int,
     checkpoint: checkpoints.Checkpoint,
+    *,
+    with_evidence: bool = True,
 ) -> tuple[MetricSceneNet, pd.DataFrame]:
     """Search for the numbers of a new SCENE-Net in metres.
 
@@ -57,10 +59,11 @@ def fit_by_search(
         history = [_middle(free, score, settings, seed, kept)]
     else:
         history = _generations(free, score, settings, seed, kept, checkpoint)
-    known = KnownAnswers()
-    model.evidence = evidence(
-        model, measured, lambda: model.best_step(curve_of(model, learnt, known))[1]
-    )
+    if with_evidence:
+        known = KnownAnswers()
+        model.evidence = evidence(
+            model, measured, lambda: model.best_step(curve_of(model, learnt, known))[1]
+        )
     return model, pd.DataFrame(history)
 
 

@@ -102,12 +102,16 @@ def fit(
     seed: int,
     *,
     checkpoint: Path | None = None,
+    with_evidence: bool = True,
 ) -> tuple[VoxelModel, pd.DataFrame]:
     """Train a new model; equal arguments give equal numbers on the same machine.
 
     Args:
         checkpoint: file written after every epoch. If it holds a training of the same settings,
             seed and samples, the training continues from it.
+        with_evidence: whether a SCENE-Net in metres says of each of its numbers whether the crops
+            determine it. That may take as long as its search; a model that is only scored needs
+            none.
 
     Returns:
         the model after the last epoch, and its history (see ``train``).
@@ -123,5 +127,7 @@ def fit(
         )
     state = Checkpoint(checkpoint, identity_of(training, validation, settings, seed))
     if settings.kind == "scenenet" and settings.protocol == "operational":
-        return fit_by_search(training, validation, settings, seed, state)
+        return fit_by_search(
+            training, validation, settings, seed, state, with_evidence=with_evidence
+        )
     return fit_by_gradient(training, validation, settings, seed, state)

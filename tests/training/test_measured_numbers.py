@@ -101,6 +101,10 @@ def test_the_search_leaves_measured_and_fixed_numbers_alone(toys, tmp_path):
     assert again.evidence == model.evidence
     assert again.metric.numbers == "measured"
     torch.testing.assert_close(again.observer()[0], model.at(0.9).observer()[0])
+    # A model that is only scored has the same numbers, and nothing is said about them.
+    scored, _ = fit(toys, [], settings(), 0, with_evidence=False)
+    assert scored.shape_parameters() == pytest.approx(numbers, rel=1e-6)  # weights are set again
+    assert scored.evidence == {}
 
 
 def test_three_numbers_do_without_the_head_and_the_sphere(toys):

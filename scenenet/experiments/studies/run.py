@@ -138,7 +138,7 @@ def _trained(
     """The model (None if its training diverged), and columns about the training."""
     begin = time.perf_counter()
     try:
-        model, history = fit(training, [], settings, seed)
+        model, history = fit(training, [], settings, seed, with_evidence=False)
         loss = float(history["loss"].iloc[-1]) if len(history) else math.nan
         found = {"epochs": len(history), "loss": loss, **_lowest(model)}
     except LostTraining as error:

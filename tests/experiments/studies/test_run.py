@@ -148,7 +148,7 @@ def files(folder):
 def test_a_row_for_every_variant_and_seed(crops, tmp_path, monkeypatch):
     trained = []
     original = run.fit
-    monkeypatch.setattr(run, "fit", lambda *a: trained.append(a) or original(*a))
+    monkeypatch.setattr(run, "fit", lambda *a, **k: trained.append(a) or original(*a, **k))
     defined = study(
         variants=[
             {"name": "as trained"},
@@ -226,9 +226,9 @@ def test_a_study_may_be_limited_to_some_crops_of_each_part(crops, tmp_path, monk
     trained_on = []
     fit = run.fit
 
-    def recorded(training, *arguments):
+    def recorded(training, *arguments, **options):
         trained_on.append([sample.id for sample in training])
-        return fit(training, *arguments)
+        return fit(training, *arguments, **options)
 
     monkeypatch.setattr(run, "fit", recorded)
     defined = study(seeds=(0,), variants=[{"name": "short", "changes": {"training.epochs": 1}}])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -24,18 +24,17 @@ from scenenet.cli.options import (
     detection_settings,
 )
 from scenenet.cli.output import show
-from scenenet.models.packaged import WIRES, packaged_model
-from scenenet.pointcloud.class_schemes import SCHEMES, ClassScheme, class_scheme
-from scenenet.pointcloud.targets import WIRE, Target
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from scenenet.clearance.settings import ClearanceSettings
-    from scenenet.prediction.result_files import PredictionFiles
-    from scenenet.prediction.settings import PredictSettings
-    from scenenet.prediction.survey_files import SurveyFiles
-    from scenenet.prediction.used_models import UsedModel
+from scenenet.cli.predicted_surveys import (
+    WIRE_CODES,
+    chosen_models,
+    clearance_settings,
+    ready_surveys,
+    refuse_without_lines,
+    replaceable_codes,
+)
+from scenenet.models.packaged import packaged_model
+from scenenet.pointcloud.class_schemes import class_scheme
+from scenenet.pointcloud.targets import Target
 
 EXAMPLES = (
     "scenenet predict line.laz --out predicted",
@@ -45,88 +44,94 @@ EXAMPLES = (
     "scenenet predict line.laz --model model.json --model wire.json --out predicted",
 )
 
-
-_WIRE_CODES = ", ".join(f"{name} {each.main_code('conductor')}" for name, each in SCHEMES.items())
+Out = Annotated[Path, typer.Option("--out", help="Folder for the results.")]
+Line = Annotated[
+    bool,
+    typer.Option(
+        "--line",
+        help="Find spans and conductors and measure clearances too, with the model of wires "
+        "that comes with the package unless --model names one of target wire.",
+    ),
+]
+VoxelSize = Annotated[
+    float | None,
+    typer.Option(min=0.01, help="Edge of a voxel in m.  [default: as the model was trained with]"),
+]
+Classify = Annotated[
+    bool,
+    typer.Option(
+        "--classify",
+        help="Give the points of towers the class code 15 (schemes asprs, edp), and with "
+        "--line or a model of target wire the points of wires that of --codes.",
+    ),
+]
+ClassCodes = Annotated[
+    Codes | None,
+    typer.Option(
+        "--codes",
+        help="Class scheme of the survey, with --line or a model of target wire: its classes "
+        "say what is near the conductors, and with --classify wires get its code "
+        f"({WIRE_CODES}).",
+    ),
+]
+ClassifyFrom = Annotated[
+    str | None,
+    typer.Option(
+        metavar="CODES",
+        help="With --classify: the class codes that may be replaced, such as 0,1,5.  [default: "
+        "every code]",
+    ),
+]
+Voltage = Annotated[
+    float | None,
+    typer.Option(
+        metavar="KV",
+        min=0.1,
+        help="With --line, or models of towers and wires: nominal voltage of the lines in kV, "
+        "by which limits for clearances are chosen.  [default: no limits]",
+    ),
+]
+Limits = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="With --voltage: limits for clearances (CSV) with the columns "
+        f"{columns_of_table(ClearanceLimits)}.  [default: examples, docs/guides/clearances.md]",
+    ),
+]
+Sags = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Clearances at another temperature: catenary parameters of spans (CSV) with the "
+        f"columns {columns_of_table(SpanSag)}.  [default: as flown]",
+    ),
+]
+Copc = Annotated[
+    bool,
+    typer.Option(
+        "--copc", help="Write the points as COPC too (NAME.copc.laz). Needs the program pdal."
+    ),
+]
 
 
 def command(
     surveys: Surveys,
     model: ModelFiles,
-    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")],
-    line: Annotated[
-        bool,
-        typer.Option(
-            "--line",
-            help="Find spans and conductors and measure clearances too, with the model of wires "
-            "that comes with the package unless --model names one of target wire.",
-        ),
-    ] = False,
-    voxel_size: Annotated[
-        float | None,
-        typer.Option(
-            min=0.01, help="Edge of a voxel in m.  [default: as the model was trained with]"
-        ),
-    ] = None,
+    out: Out,
+    line: Line = False,
+    voxel_size: VoxelSize = None,
     min_conductor: MinConductor = None,
     kernels: Kernels = None,
     measurements: Measurements = None,
     crs: System = None,
-    classify: Annotated[
-        bool,
-        typer.Option(
-            "--classify",
-            help="Give the points of towers the class code 15 (schemes asprs, edp), and with "
-            "--line or a model of target wire the points of wires that of --codes.",
-        ),
-    ] = False,
-    codes: Annotated[
-        Codes | None,
-        typer.Option(
-            "--codes",
-            help="Class scheme of the survey, with --line or a model of target wire: its classes "
-            "say what is near the conductors, and with --classify wires get its code "
-            f"({_WIRE_CODES}).",
-        ),
-    ] = None,
-    classify_from: Annotated[
-        str | None,
-        typer.Option(
-            metavar="CODES",
-            help="With --classify: the class codes that may be replaced, such as 0,1,5.  [default: "
-            "every code]",
-        ),
-    ] = None,
-    voltage: Annotated[
-        float | None,
-        typer.Option(
-            metavar="KV",
-            min=0.1,
-            help="With --line, or models of towers and wires: nominal voltage of the lines in kV, "
-            "by which limits for clearances are chosen.  [default: no limits]",
-        ),
-    ] = None,
-    limits: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="With --voltage: limits for clearances (CSV) with the columns "
-            f"{columns_of_table(ClearanceLimits)}.  [default: examples, docs/guides/clearances.md]",
-        ),
-    ] = None,
-    sags: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Clearances at another temperature: catenary parameters of spans (CSV) with the "
-            f"columns {columns_of_table(SpanSag)}.  [default: as flown]",
-        ),
-    ] = None,
-    copc: Annotated[
-        bool,
-        typer.Option(
-            "--copc", help="Write the points as COPC too (NAME.copc.laz). Needs the program pdal."
-        ),
-    ] = False,
+    classify: Classify = False,
+    codes: ClassCodes = None,
+    classify_from: ClassifyFrom = None,
+    voltage: Voltage = None,
+    limits: Limits = None,
+    sags: Sags = None,
+    copc: Copc = False,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
@@ -182,25 +187,27 @@ def command(
     from scenenet.prediction.survey_files import SurveyFiles
 
     settings = PredictSettings(
-        voxel_size=voxel_size, classify=classify, classify_from=_codes(classify, classify_from)
+        voxel_size=voxel_size,
+        classify=classify,
+        classify_from=replaceable_codes(classify, classify_from),
     )
     scheme = None if codes is None else class_scheme(codes.value)
     system = coordinate_system(crs)
     if copc:
         require_pdal()
-    clearance = _clearance(voltage, limits, sags)
+    clearance = clearance_settings(voltage, limits, sags)
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
     towers, lines = True, line
     if named and (line or model != [packaged_model()]):  # it loads torch, which takes seconds
-        model, towers, lines = _chosen(model, line, settings, scheme)
+        model, towers, lines = chosen_models(model, line, settings, scheme)
     if named and not lines:
-        _refuse_without_lines({"--line": line, "--voltage": voltage, "--sags": sags})
+        refuse_without_lines({"--line": line, "--voltage": voltage, "--sags": sags})
     results = {
         given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=lines)
         for given, survey in named.items()
     }
-    ready = _ready(named, results, model, overwrite, failures)
+    ready = ready_surveys(named, results, model, overwrite, failures)
     detection = detection_settings(min_conductor)
     tiled = any(named[given].tiled for given in ready)
     code = code_hash([writers.__file__]) if tiled else None
@@ -216,28 +223,6 @@ def command(
                     failures.errors.append(InputError(file["error"]))
     show(summaries, as_json, lambda all_: [_line(summary) for summary in all_])
     failures.end()
-
-
-def _ready(
-    named: Mapping[Path, SurveyFiles],
-    results: Mapping[Path, PredictionFiles],
-    models: Sequence[Path],
-    overwrite: bool,
-    failures: Failures,
-) -> list[Path]:
-    """The surveys that can be predicted, after a look at their headers, at the files that would be
-    replaced and at the space on the disks."""
-    from scenenet.core.outputs import check_outputs
-    from scenenet.prediction.result_files import require_space
-    from scenenet.prediction.survey_files import look_at
-
-    outputs = [output for each in results.values() for output in each.outputs()]
-    inputs = [path for survey in named.values() for path in (survey.given, *survey.files)]
-    check_outputs(outputs, [*inputs, *models], overwrite=overwrite)
-    seen = failures.look_at(named, lambda given: look_at(named[given])[0])
-    points = {g: {path: i.n_points for path, i in headers.items()} for g, headers in seen.items()}
-    require_space([(results[given], counts) for given, counts in points.items()], len(models))
-    return list(seen)
 
 
 def _line(summary: dict[str, Any]) -> str:
@@ -256,86 +241,3 @@ def _line(summary: dict[str, Any]) -> str:
             found.append(f"{wires['to_look_at']} places to look at (layer line_notes)")
     line = f"{summary['survey']}: {', '.join(found)} among {summary['points']:,} points"
     return line if summary["towers"] is not None else f"{line}; towers were not looked for"
-
-
-def _clearance(voltage: float | None, limits: Path | None, sags: Path | None) -> ClearanceSettings:
-    """How clearances are measured.
-
-    Raises:
-        typer.BadParameter: there are limits, and no voltage.
-        InputError: the limits or sags cannot be used, or there is no limit for the voltage.
-    """
-    from scenenet.clearance.limits_file import read_limits
-    from scenenet.clearance.sags import read_sags
-    from scenenet.clearance.settings import ClearanceSettings
-
-    if limits is not None and voltage is None:
-        raise typer.BadParameter("needs --voltage", param_hint="--limits")
-    given: dict[str, Any] = {} if limits is None else {"limits": read_limits(limits)}
-    if sags is not None:
-        given["sags"] = read_sags(sags)
-    settings = ClearanceSettings(voltage=voltage, **given)
-    settings.applied()  # fail before the work
-    return settings
-
-
-def _chosen(
-    models: list[Path], line: bool, settings: PredictSettings, scheme: ClassScheme | None
-) -> tuple[list[Path], bool, bool]:
-    """The models that predict, with that of wires that ``--line`` asks for; whether they find
-    towers, and whether lines follow from what they find."""
-    from scenenet.prediction.used_models import finds_lines, use_models
-
-    used = use_models(models, settings, scheme)
-    if line and not any(each.target.name == WIRE for each in used):
-        models = [*models, packaged_model(WIRES)]
-        used = use_models(models, settings, scheme)
-    _require_codes(used, settings, scheme)
-    return models, used[0].target.is_tower, finds_lines(used)
-
-
-def _refuse_without_lines(options: Mapping[str, object]) -> None:
-    """Refuse the options that need lines where no line is looked for.
-
-    Raises:
-        typer.BadParameter: one is given.
-    """
-    for option, value in options.items():
-        if value:
-            needed = (
-                "a model of towers (--model)"
-                if option == "--line"
-                else "--line, or a model of towers and one of target wire (--model, twice)"
-            )
-            raise typer.BadParameter(f"needs {needed}", param_hint=option)
-
-
-def _require_codes(
-    used: Sequence[UsedModel], settings: PredictSettings, scheme: ClassScheme | None
-) -> None:
-    """Refuse to classify wires without the scheme that has their code.
-
-    Raises:
-        typer.BadParameter: there is a model of wires, and no scheme.
-    """
-    if settings.classify and scheme is None and any(each.target.name == WIRE for each in used):
-        raise typer.BadParameter(
-            "--classify with a model of target wire needs the class scheme of the survey "
-            f"({_WIRE_CODES})",
-            param_hint="--codes",
-        )
-
-
-def _codes(classify: bool, text: str | None) -> tuple[int, ...] | None:
-    """The class codes of ``--classify-from``."""
-    if text is None:
-        return None
-    if not classify:
-        raise typer.BadParameter("needs --classify", param_hint="--classify-from")
-    codes = [part.strip() for part in text.split(",")]
-    if not all(code.isdecimal() and int(code) < 256 for code in codes):
-        raise typer.BadParameter(
-            f"{text!r} is not a list of class codes from 0 to 255, such as 0,1,5",
-            param_hint="--classify-from",
-        )
-    return tuple(int(code) for code in codes)

@@ -16,6 +16,11 @@ SHARPEST = 100.0
 one."""
 
 
+STRAY = 0.5
+"""Share of the wires of the fullest span at a tower below which another one does not continue it: a
+tower holds as many on both sides, and what is traced into the air amid trees is fewer."""
+
+
 class Step(NamedTuple):
     """A span as a line runs through it.
 
@@ -44,7 +49,8 @@ class Chain:
 def chains(spans: Sequence[TracedSpan]) -> list[Chain]:
     """The lines, each from its western end, the longest first.
 
-    At a tower with several spans, those are joined first that turn least.
+    At a tower with several spans, those are joined first that have about as many wires, and among
+    these those that turn least.
     """
     after = _joined(spans)
     left = set(range(len(spans)))
@@ -79,9 +85,10 @@ def _joined(spans: Sequence[TracedSpan]) -> dict[tuple[int, int], tuple[int, int
             for other in ends[k + 1 :]:
                 turn = abs(_turn(-_away(spans, one), _away(spans, other)))
                 if turn <= SHARPEST:
-                    pairs.append((turn, one, other))
+                    few, many = sorted(len(spans[n].wires) for n, _ in (one, other))
+                    pairs.append((few < STRAY * many, turn, one, other))
     joined: dict[tuple[int, int], tuple[int, int]] = {}
-    for _, one, other in sorted(pairs):
+    for _, _, one, other in sorted(pairs):
         if one not in joined and other not in joined:
             joined[one], joined[other] = other, one
     return joined

@@ -49,6 +49,7 @@ class LineTower:
         x, y, base: m, its foot.
         height: m.
         width: m, of its body at half its height; None if it is not known.
+        bearings: degrees clockwise from north, in which its surroundings show conductors.
     """
 
     id: int
@@ -57,6 +58,7 @@ class LineTower:
     base: float
     height: float
     width: float | None = None
+    bearings: tuple[float, ...] = ()
 
     @property
     def place(self) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scenenet.line.graph import STRAY
 from scenenet.line.hung import LineTower
 from scenenet.line.notes import UNTRACED, LineNote
 from scenenet.line.records import LineSpan
@@ -23,11 +24,6 @@ towers stand."""
 
 LONGER = 1.5
 """Length of a gap over the longest span of its line, at most. What is longer is seldom one span."""
-
-
-STRAY = 0.5
-"""Share of the conductors of the fullest span at a tower below which another one does not continue
-it: a tower holds as many on both sides, and what is traced into the air amid trees is fewer."""
 
 
 class Gap(NamedTuple):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from scenenet.detection.survey_tower import SurveyTower
+from scenenet.line.bypassed import bypassed_towers
 from scenenet.line.find_line import find_line
 from scenenet.line.hung import REACH_M, LineTower
 from scenenet.line.notes import EXPECTED, FOUND_AGAIN, PASSED, UNHELD, LineNote
@@ -91,6 +92,7 @@ def find_line_in_survey(
             known = [_in_metres(tower, towers.unit_sizes) for tower in own.towers]
             line = find_line(points, known, seen, progress)
             passed = passed_towers(known, line.conductors)
+            passed |= bypassed_towers(known, line.spans, line.conductors)
             if not passed:
                 return FoundLine(line, own)
             dropped.update(passed)
@@ -168,5 +170,5 @@ def _in_metres(tower: SurveyTower, unit_sizes: tuple[float, float, float]) -> Li
     planar, _, vertical = unit_sizes
     return LineTower(
         tower.id, tower.x * planar, tower.y * planar, tower.base * vertical,
-        tower.height * vertical, tower.width * planar,
+        tower.height * vertical, tower.width * planar, tower.conductor_bearings,
     )  # fmt: skip

@@ -207,6 +207,23 @@ def pole(number: int, x: float, y: float = 0.0) -> LineTower:
     return LineTower(number, x, y, 100.0, 16.0, 0.4)
 
 
+def test_a_line_goes_on_with_its_conductors_and_not_with_a_stray_wire():
+    """A few m of a branch amid a crown are straight ahead, and the line turns there."""
+    towers = [pole(1, 0.0), pole(2, 70.0), pole(3, 138.0, 17.0)]
+    way = (68.0, 17.0)
+    onward = [
+        Catenary((70.0, t, 114.0), (70.0 + way[0], t + way[1], 114.0), 700.0)
+        for t in (-1.8, 0.0, 1.8)
+    ]
+    stray = Catenary((70.0, 0.0, 111.0), (98.0, 0.0, 112.0), 700.0)
+    wires = [*parallel((-1.8, 0.0, 1.8), 70.0, 114.0, 700.0), *onward, stray]
+    line = line_of(towers, wires)
+    held = [span for span in line.spans if span.from_tower and span.to_tower]
+    assert [(span.from_tower, span.to_tower) for span in held] == [(1, 2), (2, 3)]
+    assert len({span.line for span in held}) == 1
+    assert len(line.spans) == 3
+
+
 def assert_one_span(line: SurveyLine, conductors: int, idle: int | None = None):
     """All conductors lead from tower 1 to tower 2; the tower ``idle`` holds none."""
     [span] = line.spans

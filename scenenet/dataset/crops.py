@@ -95,12 +95,12 @@ class Crop:
 
     def inside(self, places: np.ndarray) -> np.ndarray:
         """Rows of the places (N, 2 or more) m in the crop."""
-        offset = places[:, :2] - (self.x, self.y)
+        x, y, radius = places[:, 0] - self.x, places[:, 1] - self.y, self.radius
         if self.square:
-            return np.flatnonzero(((offset >= -self.radius) & (offset < self.radius)).all(axis=1))
-        # The bounding square first: two comparisons exclude most points, which are far away.
-        near = np.flatnonzero((np.abs(offset) <= self.radius).all(axis=1))
-        return near[(offset[near] ** 2).sum(axis=1) <= self.radius**2]
+            return np.flatnonzero((x >= -radius) & (x < radius) & (y >= -radius) & (y < radius))
+        # The bounding square first: comparisons exclude most points, which are far away.
+        near = np.flatnonzero((np.abs(x) <= radius) & (np.abs(y) <= radius))
+        return near[x[near] ** 2 + y[near] ** 2 <= radius**2]
 
 
 @dataclass(frozen=True)

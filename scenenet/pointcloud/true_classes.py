@@ -54,9 +54,9 @@ def with_true_classes(
     """
     start = 0
     for chunk, true in zip(chunks, true_chunks, strict=True):
-        moved = (np.abs(true.xyz - chunk.xyz) > tolerance).any(axis=1)
+        moved = np.abs(true.xyz - chunk.xyz) > tolerance
         if moved.any():
-            row = int(np.argmax(moved))
+            row = int(np.argmax(moved.any(axis=1)))
             raise InputError(
                 f"it lies at {_place(true.xyz[row])}, but in {labelled} at "
                 f"{_place(chunk.xyz[row])}",

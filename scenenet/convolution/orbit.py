@@ -249,7 +249,9 @@ def _lines_near(row, x, flat, rows, shape, size, lines, near):  # pragma: no cov
             begin, end = rows[source], rows[source + 1]
             if begin < end and lines[line, 0] < lines[line, 1]:
                 low = source * width + x + lines[line, 0]
-                near[n] = _first(flat, begin, end, low), end, line, source * width
+                # By number: numba compiles a check of shapes into the assignment of a row.
+                near[n, 0], near[n, 1] = _first(flat, begin, end, low), end
+                near[n, 2], near[n, 3] = line, source * width
                 n += 1
     return n
 

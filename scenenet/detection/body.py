@@ -103,8 +103,8 @@ def _measured(
         n += within(x[i] - east, y[i] - north, foot_radius)
     # A percentile, because a single return below the ground would make a bush as tall as a tower.
     lowest = _percentile(near[:n], LOWEST / 100)
-    detected = np.unique(np.rint((elevations - lowest_seen) / voxel_size).astype(np.int64))
-    middle = int((np.median(elevations) - lowest_seen) / voxel_size)
+    detected = _distinct(_levels(elevations, lowest_seen, voxel_size))
+    middle = int((_median(elevations) - lowest_seen) / voxel_size)
     head = _unbroken(detected, middle, STRAY_GAP / voxel_size)
     height = lowest_seen + head * voxel_size - lowest
     slim = max(SLIM_M, SLIM * height)
@@ -114,13 +114,60 @@ def _measured(
         near[n] = z[i]
         n += within(x[i] - east, y[i] - north, 2 * slim if leg else slim)
     # Levels count from the lowest detected voxel, which is on the lattice.
-    levels = np.unique(np.rint((near[:n] - lowest_seen) / voxel_size).astype(np.int64))
+    levels = _distinct(_levels(near[:n], lowest_seen, voxel_size))
     foot = int(np.rint((lowest - lowest_seen) / voxel_size))
-    seen = np.unique(np.concatenate((levels, detected[detected <= head])))
-    top = _unbroken(seen, middle, TOP_GAP / voxel_size)
-    upright = ((levels >= foot) & (levels <= top)).sum() / (top - foot + 1)
+    seen = np.empty(len(levels) + len(detected))
+    n = 0
+    for level in levels:
+        seen[n] = level
+        n += 1
+    for level in detected:
+        if level <= head:
+            seen[n] = level
+            n += 1
+    top = _unbroken(_distinct(seen[:n]), middle, TOP_GAP / voxel_size)
+    n = 0
+    for level in levels:
+        n += foot <= level <= top
+    upright = n / (top - foot + 1)
     base = lowest - voxel_size / 2
     return base, lowest_seen + (top + 0.5) * voxel_size - base, upright
+
+
+# One sort of floats serves levels, percentiles and medians, and loops stand for expressions of
+# arrays: numba compiles each sort, selection and expression of arrays anew, at seconds apiece.
+
+
+@numba.njit(**EXACT)
+def _levels(elevations, lowest, voxel_size):  # pragma: no cover - compiled
+    """Level (N,), a whole number, of elevations (N,) m."""
+    levels = np.empty(len(elevations))
+    for i in range(len(elevations)):
+        levels[i] = np.rint((elevations[i] - lowest) / voxel_size)
+    return levels
+
+
+@numba.njit(**EXACT)
+def _distinct(levels):  # pragma: no cover - compiled
+    """The different ones of levels (N,), ascending integers."""
+    ordered = np.sort(levels)
+    distinct = np.empty(len(ordered), np.int64)
+    n = 0
+    for i in range(len(ordered)):
+        if i == 0 or ordered[i] != ordered[i - 1]:
+            distinct[n] = np.int64(ordered[i])
+            n += 1
+    return distinct[:n]
+
+
+@numba.njit(**EXACT)
+def _median(values):  # pragma: no cover - compiled
+    """As ``np.median`` gives it, to the bit."""
+    ordered = np.sort(values)
+    half = len(ordered) // 2
+    if len(ordered) % 2:
+        return ordered[half]
+    return (ordered[half - 1] + ordered[half]) / 2
 
 
 @numba.njit(**EXACT)
@@ -156,7 +203,7 @@ def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cove
     for i in range(len(x)):
         px, py, pz = x[i] - east, y[i] - north, z[i] - base
         if MIDDLE[0] * height <= pz <= MIDDLE[1] * height and within(px, py, 4 * slim):
-            places[n] = px, py, pz
+            places[n, 0], places[n, 1], places[n, 2] = px, py, pz
             n += 1
     if n == 0:
         return 0.0, 0.0, 0.0
@@ -177,7 +224,7 @@ def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cove
                 for k in range(2):
                     least[level[i], k] = min(least[level[i], k], places[i, k])
                     greatest[level[i], k] = max(greatest[level[i], k], places[i, k])
-        middles = np.empty((n_levels, 2))
+        middles = np.empty((2, n_levels))
         n_seen = n_free = 0
         for k in range(n_levels):
             if greatest[k, 0] < least[k, 0]:
@@ -185,10 +232,11 @@ def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cove
             n_seen += 1
             wide = max(greatest[k, 0] - least[k, 0], greatest[k, 1] - least[k, 1]) + voxel_size
             if wide <= 2 * slim + voxel_size:
-                middles[n_free] = (least[k] + greatest[k]) / 2
+                for axis in range(2):
+                    middles[axis, n_free] = (least[k, axis] + greatest[k, axis]) / 2
                 n_free += 1
         if n_free:
-            at_east, at_north = np.median(middles[:n_free, 0]), np.median(middles[:n_free, 1])
+            at_east, at_north = _median(middles[0, :n_free]), _median(middles[1, :n_free])
             free = n_free / n_seen
     return at_east, at_north, free
 
@@ -199,10 +247,15 @@ def _pieces(places, voxel_size):  # pragma: no cover - compiled
     to, also over a corner, and the number of pieces."""
     n = len(places)
     steps = np.empty((n, 3), np.int64)
+    last = np.zeros(3, np.int64)
     for k in range(3):
-        steps[:, k] = np.rint((places[:, k] - places[:, k].min()) / voxel_size).astype(np.int64)
-    shape = steps[:, 0].max() + 3, steps[:, 1].max() + 3, steps[:, 2].max() + 1
-    at = np.full(shape, -1, np.int64)  # with a border
+        least = places[0, k]
+        for i in range(n):
+            least = min(least, places[i, k])
+        for i in range(n):
+            steps[i, k] = np.int64(np.rint((places[i, k] - least) / voxel_size))
+            last[k] = max(last[k], steps[i, k])
+    at = np.full((last[0] + 3, last[1] + 3, last[2] + 1), -1, np.int64)  # with a border
     for i in range(n):
         at[steps[i, 0] + 1, steps[i, 1] + 1, steps[i, 2]] = i
     piece, waiting = np.full(n, -1, np.int64), np.empty(n, np.int64)
@@ -215,7 +268,8 @@ def _pieces(places, voxel_size):  # pragma: no cover - compiled
         while n_waiting:
             n_waiting -= 1
             a, b, c = steps[waiting[n_waiting]]
-            for other in at[a : a + 3, b : b + 3, c].flat:
+            for near in range(9):
+                other = at[a + near // 3, b + near % 3, c]
                 if other >= 0 and piece[other] < 0:
                     piece[other], waiting[n_waiting] = n_pieces, other
                     n_waiting += 1

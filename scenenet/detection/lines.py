@@ -177,12 +177,16 @@ def _on_lines(grid, places, cells, line):  # pragma: no cover - compiled
             if votes[most] == 0:
                 break
             votes[most] = 0
-            u[:] = towards[most]
+            # By number: numba compiles a check of shapes, with its message, into the assignment
+            # of a row to a row, which takes seconds.
+            for k in range(3):
+                u[k] = towards[most, k]
             _fit(x, y, z, square, line, u, middle, inside[:n])
             on = _pieces_on_line(x, y, z, line, u, middle)
             if on > best:
                 best = on
-                direction[row] = u
+                for k in range(3):
+                    direction[row, k] = u[k]
         found[row] = best >= line.pieces
     return found, direction
 

@@ -143,7 +143,8 @@ def _bowed(s, low, length):  # pragma: no cover - compiled
     found = np.empty((len(s), 3))
     for i in range(len(s)):
         u = (s[i] - low) / length
-        found[i] = 1 - u, u, 4 * u * (1 - u)
+        # By number: numba compiles a check of shapes into the assignment of a row, for seconds.
+        found[i, 0], found[i, 1], found[i, 2] = 1 - u, u, 4 * u * (1 - u)
     return found
 
 
@@ -155,7 +156,7 @@ def _parabola(
     basis, above = np.empty_like(bowed), np.empty(len(z))
     for i in range(len(z)):
         u = bowed[i, 1]
-        basis[i] = 1 - u, u, -(squared / 2 * u * (1 - u))
+        basis[i, 0], basis[i, 1], basis[i, 2] = 1 - u, u, -(squared / 2 * u * (1 - u))
         height = c * (np.cosh((u * span - lowest) / c) - at_start)
         above[i] = z[i] - (height - rise * u + curvature * squared / 2 * u * (1 - u))
     return basis, above

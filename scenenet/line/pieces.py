@@ -119,7 +119,12 @@ def _groups(middle, points, gradient):  # pragma: no cover - compiled
     for i in range(n):
         s, t, z = points[i, 0] - middle, points[i, 1], points[i, 2]
         across[i], up[i] = np.rint(t / SEEN_M), np.rint((z - gradient * s) / SEEN_M)
-    key = (across - across.min()) * (up.max() - up.min() + 1) + (up - up.min())
+    west, low, high = across[0], up[0], up[0]
+    for i in range(n):
+        west, low, high = min(west, across[i]), min(low, up[i]), max(high, up[i])
+    key = np.empty(n, np.int64)
+    for i in range(n):
+        key[i] = (across[i] - west) * (high - low + 1) + (up[i] - low)
     order = np.argsort(key, kind="mergesort")
     cell_of = np.empty(n, np.int64)
     first = np.empty(n, np.int64)
@@ -151,7 +156,8 @@ def _groups(middle, points, gradient):  # pragma: no cover - compiled
     ends = np.zeros(count + 1, np.int64)
     for i in range(n):
         ends[label[cell_of[i]] + 1] += 1
-    ends = np.cumsum(ends)
+    for group in range(count):
+        ends[group + 1] += ends[group]
     at, rows = ends[:-1].copy(), np.empty(n, np.int64)
     for i in range(n):
         group = label[cell_of[i]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenenet.detection import body
 from scenenet.detection.body import centre_body, measure_body
 
 AXIS = np.array([0.5, 0.5])
@@ -96,3 +97,15 @@ def test_a_body_that_is_touched_everywhere_stays_where_it_is(lattice):
     axis, free = centre_body(block, at, stand(lattice, block), 1.0)
     assert free == 0
     assert np.array_equal(axis, at)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 40, 41])
+def test_medians_percentiles_and_levels_are_those_of_numpy_to_the_bit(n):
+    values = np.random.default_rng(n).normal(0, 3, n)
+    levels = np.rint(values)
+    assert body._median(values) == np.median(values)
+    assert body._percentile(values, 0.02) == np.percentile(values, 2)
+    assert body._distinct(levels).tolist() == np.unique(levels.astype(int)).tolist()
+    assert body._levels(values, values.min(), 0.2).tolist() == (
+        np.rint((values - values.min()) / 0.2).tolist()
+    )

@@ -94,15 +94,22 @@ def test_a_tower_that_was_missed_is_found_where_the_line_expects_it(line, model,
     assert FoundLine.from_json(again.to_json()).towers.towers == again.towers.towers
 
 
+@pytest.mark.parametrize(
+    ("beside", "height", "width"), [(0.0, 1.0, 3.0), (3.0, 0.4, 0.4)], ids=["amid", "beside"]
+)
 def test_a_tree_that_was_taken_for_a_tower_is_dropped_and_its_place_listed(
-    line, model, wire_finder
+    line, model, wire_finder, beside, height, width
 ):
+    """Either the conductor passes it without a bend, or its span goes on beside it."""
     with predict_survey(line, [model, wire_finder], PredictSettings(), LONE_POLES) as whole:
         search, towers = searches(whole)
         found = find_in_survey(towers)
         first, second, _ = sorted(found.towers, key=lambda tower: tower.x)
-        middle = (first.x + second.x) / 2, (first.y + second.y) / 2
-        tree = replace(first, id=7, x=middle[0], y=middle[1], width=3.0)
+        middle = (first.x + second.x) / 2, (first.y + second.y) / 2 + beside
+        tree = replace(
+            first, id=7, x=middle[0], y=middle[1], width=width, height=height * first.height,
+            conductor_bearings=(90.0, 270.0),
+        )  # fmt: skip
         again = find_line_in_survey(search, towers, replace(found, towers=(*found.towers, tree)))
     assert {tower.id for tower in again.towers.towers} == {tower.id for tower in found.towers}
     notes = [note for note in again.line.notes if note.what == PASSED]

@@ -27,9 +27,9 @@ def bypassed_towers(
 ) -> set[int]:
     """Ids of the towers beside a span between two others that have no conductors but those of it.
 
-    Such a tower holds none of the wires, or few, in the direction of the span. The others would
-    bend there if they were carried, or they pass further above it than it can hold them. A tower
-    from which a wire leads to a third one is of another line.
+    Such a tower holds no wire, and those of the span pass further above it than it can hold them;
+    or it holds few of them in the direction of the span, whose conductors would bend there if they
+    were carried. A tower from which a wire leads to a third one is of another line.
 
     Args:
         towers: of the survey, m.
@@ -65,13 +65,12 @@ def _passes(
     places = [_beside(wire, tower) for wire in wires]
     if min(abs(beside) for beside, _ in places) > CROWN_M:
         return False
-    bend = span.length / (4 * float(np.median([wire.c for wire in wires])))
     if not held:
         bearings = np.radians(tower.bearings)
         ways = np.column_stack((np.sin(bearings), np.cos(bearings)))
-        carried = bend < BEND and any(tower.holds(z) for _, z in places)
-        return bool(_along(ways, frame).any()) and not carried
+        return bool(_along(ways, frame).any()) and not any(tower.holds(z) for _, z in places)
     ways = np.array([wire.catenary.direction for each in held for wire in each])
+    bend = span.length / (4 * float(np.median([wire.c for wire in wires])))
     few = max(map(len, held)) < STRAY * len(wires)
     return few and bool(_along(ways, frame).all()) and bend >= BEND
 

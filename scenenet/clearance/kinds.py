@@ -28,7 +28,8 @@ BELOW_M = 2.0
 
 COLUMN_M, GAP_M, GAP = 5.0, 20.0, 0.6
 """m, edge of columns; points in one above a gap of this many m, and of this share of their height,
-are in the air: birds, clouds, and wires that were not found."""
+are in the air: birds, clouds, and wires that were not found. The jib of a crane is not: it hangs
+together with a mast."""
 
 MIN_GROUND = 50
 """Points with a class of ground from which the ground model is made of them."""
@@ -115,12 +116,38 @@ def surroundings(
     height = xyz[:, 2] - ground.height(xyz[:, :2])
     band = BAND_M + BAND_SLOPE * ground.slope(xyz[:, :2])
     by_height = np.where(height <= band, ON_GROUND, PLANT)
-    by_height[(height < -BELOW_M) | _in_the_air(xyz[:, :2], height)] = NO_OBSTACLE
+    by_height[(height < -BELOW_M) | _in_the_air(xyz, height)] = NO_OBSTACLE
     kind = np.where(known == BY_HEIGHT, by_height, known).astype(np.int8)
     return Surroundings(xyz, kind, height, ground, few)
 
 
-def _in_the_air(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
+def _in_the_air(xyz: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """(n,) bool: which points (n, 3) m, at heights (n,) m above ground, nothing holds."""
+    above = _above_gap(xyz[:, :2], height)
+    if above.any():
+        rows = np.flatnonzero(height >= height[above].min() - CUBE_M)
+        above[rows] = ~_held(xyz[rows], ~above[rows])
+    return above
+
+
+def _held(xyz: np.ndarray, standing: np.ndarray) -> np.ndarray:
+    """(n,) bool: which points (n, 3) m hang together with one that is ``standing`` (n,), cube by
+    cube."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    cubes, cube = np.unique(np.floor(xyz / CUBE_M), axis=0, return_inverse=True)
+    cube = cube.ravel()
+    pairs = cKDTree(cubes).query_pairs(1.0, p=np.inf, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(cubes),) * 2)
+    n, part = connected_components(links, directed=False)
+    stands = np.zeros(n, bool)
+    stands[part[cube[standing]]] = True
+    return stands[part[cube]]
+
+
+def _above_gap(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
     """(n,) bool: which points at places (n, 2) m and heights (n,) m above ground have nothing below
     them."""
     found = np.zeros(len(height), bool)

@@ -102,3 +102,16 @@ def test_single_points_are_lone_where_others_stand_together(scene):
     assert around.lone[:plants].mean() < 0.01 and not around.lone[plants + 3 :].any()
     sparse = surroundings(np.concatenate((dust, xyz[codes == 2])), None, None, FEW)
     assert not sparse.lone.any()
+
+
+def test_a_jib_over_open_ground_is_held_by_its_mast_and_a_flock_is_not(scene):
+    xyz, codes = scene
+    base = ground_at(np.array([[70.0, 60.0]]))[0]
+    mast = np.array([(70.0, 60.0, base + z) for z in np.arange(0, 34, 0.2)])
+    jib = np.array([(x, 60.0, base + 30) for x in np.arange(36, 78, 0.2)])
+    flock = jib + np.array([0.0, -12.0, 3.0])
+    ground = xyz[codes == 2]
+    around = surroundings(np.concatenate((mast, jib, flock, ground)), None, None, FEW)
+    kind = around.kind[len(mast) : len(mast) + len(jib) + len(flock)]
+    assert (kind[: len(jib)] == PLANT).all()
+    assert (kind[len(jib) :] == NO_OBSTACLE).all()

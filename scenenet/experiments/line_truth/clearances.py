@@ -126,10 +126,11 @@ def _shown(found: SurveyClearances, limit: float) -> np.ndarray:
 
     Places that are joined by what is found between them are listed as one, at their worst point.
     The profile of the span shows the others. What is thin and straight in the air, as a cable is,
-    is listed as a wire.
+    is listed as a wire, which has a limit of its own and is no danger from the same distance.
     """
-    listed = [place for place in found.dangers if place.kind in (VEGETATION, WIRE)]
-    spans = {place.span_id for place in listed if place.kind == VEGETATION}
+    plants = [place for place in found.dangers if place.kind == VEGETATION]
+    listed = plants + [place for place in found.places if place.kind == WIRE]
+    spans = {place.span_id for place in plants}
     steps = (
         (step.x, step.y)
         for step in found.profile

@@ -71,6 +71,14 @@ def test_a_place_that_is_listed_with_its_neighbour_is_found(survey):
     assert unseen.missed > 0
 
 
+def test_a_cable_that_keeps_its_own_limit_is_not_missed(survey):
+    corridor, cloud, line, clearances = survey
+    cables = [replace(place, kind="wire", what="nearest") for place in clearances.dangers]
+    listed = replace(clearances, places=tuple(cables), profile=())
+    found = compare("lattice_pole", corridor, cloud, line, listed, LIMITS)
+    assert found.places > 0 and (found.missed, found.false) == (0, 0)
+
+
 def test_what_is_found_and_not_there_is_false(survey):
     corridor, cloud, line, clearances = survey
     moved = [replace(place, x=place.x + 500.0) for place in clearances.dangers if place.points >= 5]

@@ -13,6 +13,11 @@ JOINED_M = 2.9
 """m, distance of the centres of cells that belong to one place: at most one empty cell, or two in a
 diagonal, lies between them."""
 
+REACH_M = 5.0
+"""m in plan that a part of a place of vegetation reaches around its nearest point: that of a crown.
+Trees beside a line touch one another for hundreds of metres, and each of them may have to be cut.
+"""
+
 
 def places(xyz: np.ndarray, kind: np.ndarray) -> Iterator[np.ndarray]:
     """Rows (m,) of the points of each place; a place has points of one kind.
@@ -34,3 +39,29 @@ def places(xyz: np.ndarray, kind: np.ndarray) -> Iterator[np.ndarray]:
         place = place[cell.ravel()]
         for each in range(n):
             yield rows[place == each]
+
+
+def divided(xyz: np.ndarray, distance: np.ndarray, few: int) -> list[np.ndarray]:
+    """Rows (m,) of the parts of a place, each around its nearest point, the nearest part first.
+
+    A part reaches ``REACH_M`` in plan around its nearest point. Fewer than ``few`` points beyond
+    the parts are no part; they belong to the one next to them.
+
+    Args:
+        xyz: (n, 3) m, of the points.
+        distance: (n,) m, from the conductors.
+    """
+    from scipy.spatial import cKDTree
+
+    part = np.full(len(xyz), -1)
+    left = np.argsort(distance, kind="stable")
+    centres: list[int] = []
+    while len(left):
+        near = np.hypot(*(xyz[left, :2] - xyz[left[0], :2]).T) <= REACH_M
+        if not centres or near.sum() >= few:
+            part[left[near]] = len(centres)
+            centres.append(int(left[0]))
+        left = left[~near]
+    beyond = np.flatnonzero(part < 0)
+    part[beyond] = cKDTree(xyz[centres, :2]).query(xyz[beyond, :2])[1]
+    return [np.flatnonzero(part == each) for each in range(len(centres))]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,7 +22,7 @@ from scenenet.clearance.records import (
 )
 from scenenet.clearance.sags import hung, without_conductor
 from scenenet.clearance.section import BEYOND_M, Area, PointsIn, measure, sections
-from scenenet.clearance.settings import KINDS, WIRE, ClearanceLimits, ClearanceSettings
+from scenenet.clearance.settings import KINDS, VEGETATION, WIRE, ClearanceLimits, ClearanceSettings
 from scenenet.clearance.trees import Trees
 from scenenet.core.progress import track
 from scenenet.line.frame import SpanFrame
@@ -168,7 +168,7 @@ class _Finder:
     def _dangers(self, too_near: TooNear, own: Sequence[Conductor]) -> list[Clearance]:
         wires = {wire.conductor_id: wire for wire in own}
         found = []
-        for rows in danger.places(too_near.xyz, too_near.kind):
+        for rows in self._parts(too_near):
             worst = rows[np.argmin(too_near.distance[rows])]
             point = NearPoint(
                 wires[int(too_near.conductor[worst])], POINT_KINDS[too_near.kind[worst]],
@@ -176,6 +176,16 @@ class _Finder:
             )  # fmt: skip
             found.append(self._place("danger", point, len(rows)))
         return found
+
+    def _parts(self, too_near: TooNear) -> Iterator[np.ndarray]:
+        """Rows (m,) of the points of each place; a long one of vegetation is several."""
+        for rows in danger.places(too_near.xyz, too_near.kind):
+            if POINT_KINDS[too_near.kind[rows[0]]] != VEGETATION:
+                yield rows
+                continue
+            few = self._settings.few_points
+            for part in danger.divided(too_near.xyz[rows], too_near.distance[rows], few):
+                yield rows[part]
 
     def _place(self, what: str, point: NearPoint, points: int, other_span: int = 0) -> Clearance:
         wire = point.conductor

@@ -152,7 +152,7 @@ def _run_through(spans: Sequence[TracedSpan], chain: Chain, index: int) -> Trace
             if tower is not None:
                 away = (tower.place - wire.catenary.start[:2]) @ along
                 reach[end] = float(away / (wire.catenary.direction @ along))
-        wires.append(replace(wire, catenary=wire.catenary.between(*reach)))
+        wires.append(wire.between(*reach))
     return replace(span, wires=tuple(wires))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -87,6 +87,13 @@ class HungWire:
     rows: np.ndarray
     covered: float
     subconductors: int
+
+    def between(self, first: float, last: float) -> HungWire:
+        """The same wire between other distances from its start, m. It is not seen beyond its
+        ends."""
+        seen = min(last, self.catenary.length) - max(first, 0.0)
+        covered = self.covered * max(seen, 0.0) / (last - first)
+        return replace(self, catenary=self.catenary.between(first, last), covered=covered)
 
 
 @dataclass(frozen=True)

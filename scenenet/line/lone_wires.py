@@ -158,7 +158,7 @@ def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[T
                 reach[number] = float(catenary.along(tower.place[None])[0][0])
         if first is None and last is None and catenary.length < MIN_ALONE_M:
             continue
-        wire = replace(wire, catenary=catenary.between(*reach))
+        wire = wire.between(*reach)
         key = (0 if first is None else first.id, 0 if last is None else last.id)
         groups.setdefault(key, []).append((wire, first, last))
     spans = []

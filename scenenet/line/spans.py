@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -158,6 +157,6 @@ def _between(
             continue
         if max(abs(beside), abs(beside_end)) > REACH_M:
             continue
-        ends = catenary.between(start, end)
-        if first.holds(ends.start[2]) and last.holds(ends.end[2]):
-            yield replace(wire, catenary=ends)
+        whole = wire.between(start, end)
+        if first.holds(whole.catenary.start[2]) and last.holds(whole.catenary.end[2]):
+            yield whole

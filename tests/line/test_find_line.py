@@ -247,3 +247,13 @@ def test_a_mast_under_the_conductors_takes_none_from_the_tower_next_to_it():
 def test_a_tower_beside_its_conductors_holds_those_that_no_other_one_does():
     wires = parallel((-1.8, 0.0, 1.8), 70.0, 114.0, 700.0)
     assert_one_span(line_of([pole(1, 0.0), pole(2, 70.0, 4.0)], wires), 3)
+
+
+def test_a_conductor_is_seen_no_further_than_its_points_reach():
+    """A crown hides the last third of each conductor."""
+    wires = [w.between(0.0, 80.0) for w in parallel((-1.8, 0.0, 1.8), 120.0, 114.0, 700.0)]
+    line = line_of([pole(1, 0.0), pole(2, 120.0)], wires)
+    assert_one_span(line, 3)
+    assert [c.seen for c in line.conductors] == pytest.approx([2 / 3] * 3, abs=0.03)
+    whole = line_of([pole(1, 0.0), pole(2, 120.0)], parallel((-1.8, 1.8), 120.0, 114.0, 700.0))
+    assert min(c.seen for c in whole.conductors) > 0.95

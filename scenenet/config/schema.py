@@ -64,7 +64,7 @@ class NewSurveys(Settings):
 
 
 class SyntheticSurvey(SyntheticSettings):
-    """A synthetic survey, made as RESULTS_DIR/synthetic/NAME.laz."""
+    """A synthetic survey, made as RESULTS_DIR/synthetic/NAME.laz; .las if it is temporary."""
 
     name: str = Field(pattern=NAME, description="name of its file")
 
@@ -78,8 +78,15 @@ class Synthetic(Settings):
     temporary: bool = Field(
         False,
         description="delete the files of the synthetic surveys once their crops are cut; they are "
-        "made again when a stage has to read them",
+        "made again when a stage has to read them. They are .las files, which are eight times as "
+        "large as .laz and read in a third of the time",
     )
+
+    @property
+    def suffix(self) -> str:
+        """Suffix of the files. One that is soon deleted is not worth compressing: it would be
+        compressed twice, with its truth, and decompressed five times."""
+        return ".las" if self.temporary else ".laz"
 
 
 class Prediction(PredictSettings):

@@ -53,7 +53,7 @@ class SurveyRow(Settings):
         description="LAS, LAZ, COPC, .npy or .pt file; for train also a folder of TS40K samples; "
         "for new also a folder, a pattern or a tile index of LAS and LAZ files, which are one "
         "survey; relative to the root of the project, or absolute; "
-        f"{RESULTS}/synthetic/NAME.laz is a synthetic survey",
+        f"{RESULTS}/synthetic/NAME.laz is a synthetic survey, .las where they are temporary",
     )
     codes: Codes = Field(description="class scheme of the labels")
     role: Role = Field(description="train: part of the dataset; new: only classified")
@@ -226,7 +226,7 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
         return None, problems
     path = str(Path(path).expanduser())
     made = {
-        str(Path(config.results_dir, "synthetic", f"{survey.name}.laz"))
+        str(Path(config.results_dir, "synthetic", f"{survey.name}{config.synthetic.suffix}"))
         for survey in config.synthetic.surveys
     }
     synthetic = path in made
@@ -277,7 +277,8 @@ def _path_problems(path: str, written: str, role: str, root: Path, config: Confi
     if written.startswith(RESULTS) or where.parent.name == "synthetic":
         names = [survey.name for survey in config.synthetic.surveys]
         close = difflib.get_close_matches(where.stem, names, n=1)
-        hint = f", did you mean {RESULTS}/synthetic/{close[0]}.laz?" if close else ""
+        made = f"{RESULTS}/synthetic/{close[0]}{config.synthetic.suffix}" if close else ""
+        hint = f", did you mean {made}?" if close else ""
         return [f"{path} is not there, and no entry of synthetic.surveys makes it{hint}"]
     if not where.parent.is_dir():
         return [f"{path} is not there, nor is its folder"]

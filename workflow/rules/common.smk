@@ -132,7 +132,8 @@ def tower_list(survey):
 def truth_of(survey):
     """The file with the true classes of a survey, in a list; an empty one for a recorded survey."""
     path = Path(SURVEYS[survey].path)
-    return [str(path.with_suffix(".truth.laz"))] if SURVEYS[survey].origin == "synthetic" else []
+    truth = str(path.with_suffix(f".truth{settings.synthetic.suffix}"))
+    return [truth] if SURVEYS[survey].origin == "synthetic" else []
 
 
 def source_prints(survey):

@@ -16,7 +16,7 @@ rule towers:
         f"{R}/benchmarks/towers/{{survey}}.tsv"
     wildcard_constraints:
         survey=any_of(TRAIN),
-    priority: 1
+    priority: 2
     conda:
         "../envs/scenenet.yaml"
     threads: 1
@@ -53,7 +53,8 @@ rule crops:
         f"{R}/benchmarks/crops/{{survey}}.tsv"
     wildcard_constraints:
         survey=any_of(TRAIN),
-    priority: 1
+    # Before new surveys are made: temporary ones, which are large, are deleted after it.
+    priority: 3
     conda:
         "../envs/scenenet.yaml"
     threads: 1

@@ -221,7 +221,8 @@ def write_layer(
     from pyogrio import set_gdal_config_options
     from pyogrio.raw import write
 
-    set_gdal_config_options({"OGR_CURRENT_DATE": WRITTEN})
+    # The file appears when it is whole. To wait for the disk after each layer would add nothing.
+    set_gdal_config_options({"OGR_CURRENT_DATE": WRITTEN, "OGR_SQLITE_SYNCHRONOUS": "OFF"})
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "'crs' was not provided")  # the survey has none
         write(

@@ -179,6 +179,9 @@ def _cells(xyz: np.ndarray, box: np.ndarray) -> tuple[np.ndarray, tuple[int, int
     corner = np.floor(box[0] / CELL_M)
     columns, rows = (np.floor(box[1] / CELL_M) - corner).astype(int) + 1
     shape = (max(int(rows), 2), max(int(columns), 2))
-    at = np.floor(xyz[:, :2] / CELL_M).astype(int) - corner.astype(int)
-    at = np.clip(at, 0, (shape[1] - 1, shape[0] - 1))
-    return (corner + 0.5) * CELL_M, shape, at[:, 1] * shape[1] + at[:, 0]
+    # Axis by axis, which is several times as fast as both together.
+    column, row = (
+        np.clip(np.floor(xyz[:, axis] / CELL_M).astype(int) - int(corner[axis]), 0, most - 1)
+        for axis, most in enumerate(shape[::-1])
+    )
+    return (corner + 0.5) * CELL_M, shape, row * shape[1] + column

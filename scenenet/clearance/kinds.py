@@ -11,6 +11,7 @@ import numpy as np
 
 from scenenet.clearance.ground_model import GroundModel
 from scenenet.core.compilation import EXACT
+from scenenet.core.extent import extent
 from scenenet.pointcloud.class_schemes import ClassScheme, Role
 
 NO_OBSTACLE, ON_GROUND, PLANT, HOUSE = -1, 0, 1, 2
@@ -107,7 +108,7 @@ def surroundings(
     if not len(xyz):
         flat = GroundModel(np.zeros(2), np.zeros((2, 2)), np.zeros((2, 2)))
         return Surroundings(xyz, known, np.empty(0), flat, few)
-    box = np.array([xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)])
+    box = np.array(extent(xyz[:, :2]))
     on_ground = known == ON_GROUND
     if on_ground.sum() >= MIN_GROUND:
         ground = GroundModel.from_ground(xyz[on_ground], box)
@@ -123,7 +124,7 @@ def surroundings(
 
 def _in_the_air(xyz: np.ndarray, height: np.ndarray) -> np.ndarray:
     """(n,) bool: which points (n, 3) m, at heights (n,) m above ground, nothing holds."""
-    above = _above_gap(xyz[:, :2], height)
+    above = above_gap(xyz[:, :2], height)
     if above.any():
         rows = np.flatnonzero(height >= height[above].min() - CUBE_M)
         above[rows] = ~_held(xyz[rows], ~above[rows])
@@ -147,17 +148,16 @@ def _held(xyz: np.ndarray, standing: np.ndarray) -> np.ndarray:
     return stands[part[cube]]
 
 
-def _above_gap(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
+def above_gap(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
     """(n,) bool: which points at places (n, 2) m and heights (n,) m above ground have nothing below
     them."""
     found = np.zeros(len(height), bool)
     if not (height > GAP_M).any():
         return found
-    east, north = np.floor(xy / COLUMN_M).astype(int).T
-    column = (east - east.min()) * (np.ptp(north) + 1) + north - north.min()
-    high = np.zeros(int(column.max()) + 1, bool)
-    high[column[height > GAP_M]] = True
-    rows = np.flatnonzero(high[column])
+    # Axis by axis, which is several times as fast as both together.
+    east, north = (np.floor(xy[:, axis] / COLUMN_M).astype(np.int64) for axis in range(2))
+    column = (east - east.min()) * (np.ptp(north) + 1) + (north - north.min())
+    rows = np.flatnonzero(_ends_of_gaps(column, height))
     order = np.lexsort((height[rows], column[rows]))
     order = rows[order]
     column, height = column[order], height[order]
@@ -169,6 +169,28 @@ def _above_gap(xy: np.ndarray, height: np.ndarray) -> np.ndarray:
     first = np.maximum.accumulate(np.where(starts, np.arange(len(gaps)), 0))
     found[order] = gaps > before[first]
     return found
+
+
+def _ends_of_gaps(column: np.ndarray, height: np.ndarray) -> np.ndarray:
+    """(n,) bool: points among which all gaps of columns with a point above ``GAP_M`` are.
+
+    A gap that ends below that begins below the ground. None does where a point is close above the
+    ground and none is far below it: the highest of the low points stands for all of them.
+
+    Args:
+        column: (n,) number of the column of each point.
+        height: (n,) m above the ground.
+    """
+    n = int(column.max()) + 1
+    low = height <= GAP_M
+    high, close, deep = np.zeros(n, bool), np.zeros(n, bool), np.zeros(n, bool)
+    high[column[~low]] = True
+    close[column[(height >= 0) & (height < GAP_M / 2)]] = True
+    deep[column[height < -GAP_M / 2]] = True
+    highest = np.full(n, -np.inf)
+    np.maximum.at(highest, column[low], height[low])
+    sorted_out = low & (close & ~deep)[column] & (height < highest[column])
+    return high[column] & ~sorted_out
 
 
 def lone_points(xyz: np.ndarray, kind: np.ndarray, few: int) -> np.ndarray:
@@ -183,8 +205,9 @@ def lone_points(xyz: np.ndarray, kind: np.ndarray, few: int) -> np.ndarray:
         if not len(rows):
             continue
         at = np.floor(xyz[rows] / CUBE_M).astype(np.int64)
-        at -= at.min(axis=0) - 1
-        size = at.max(axis=0) + 2
+        low, high = extent(at)
+        at -= low - 1
+        size = high - low + 3
         flat = (at[:, 0] * size[1] + at[:, 1]) * size[2] + at[:, 2]
         cubes, cube, count = np.unique(flat, return_inverse=True, return_counts=True)
         few_around = _around(cubes, count, size[1], size[2])[cube] < few

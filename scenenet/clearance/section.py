@@ -55,7 +55,7 @@ class Area:
 
     def has(self, xyz: np.ndarray) -> np.ndarray:
         """(n,) bool: which points (n, 3) m are in it."""
-        s, t, _ = self.frame.to_frame(xyz).T
+        s, t = self.frame.in_plan(xyz)
         return (s >= self.first) & (s < self.last) & (np.abs(t) <= self.half_width)
 
 
@@ -133,7 +133,7 @@ def measure(
     here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
     xyz, kind = around.xyz[here], around.kind[here]
     last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)
-    along = area.frame.to_frame(xyz)[:, 0]
+    along, _ = area.frame.in_plan(xyz)
     step = np.clip((along / settings.step).astype(int), 0, last)
     trees = find_trees(around, settings.tree_height)
     inside = area.has(trees.feet)

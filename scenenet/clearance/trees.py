@@ -56,7 +56,8 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
     smooth = ndimage.gaussian_filter(canopy, 1.0, mode="constant")
     peaks = (ndimage.maximum_filter(smooth, size=3, mode="constant") == smooth) & (smooth > 0)
     # The highest point within a metre of a peak is the top.
-    tree = cKDTree(xy)
+    # Few places are asked for: to build the tree takes longer than to search it.
+    tree = cKDTree(xy, compact_nodes=False, balanced_tree=False)
     near = tree.query_ball_point((np.argwhere(peaks) + cells.corner + 0.5) * CELL_M, CROWN_M)
     tops = np.unique(np.array([own[int(np.argmax(height[own]))] for own in near if own], int))
     tops = tops[height[tops] >= min_height]
@@ -92,10 +93,11 @@ class _Cells:
     @classmethod
     def of(cls, xy: np.ndarray) -> _Cells:
         """Of points at (n, 2) m, at least one."""
-        at = np.floor(xy / CELL_M).astype(int)
-        corner = at.min(axis=0)
-        columns, rows = at.max(axis=0) - corner + 1
-        flat = (at[:, 0] - corner[0]) * rows + at[:, 1] - corner[1]
+        # Axis by axis, which is several times as fast as both together.
+        column, row = (np.floor(xy[:, axis] / CELL_M).astype(int) for axis in range(2))
+        corner = np.array([column.min(), row.min()])
+        columns, rows = np.array([column.max(), row.max()]) - corner + 1
+        flat = (column - corner[0]) * rows + row - corner[1]
         counts = np.bincount(flat, minlength=columns * rows).reshape(columns, rows)
         return cls(corner, counts, flat)
 

@@ -31,9 +31,13 @@ class SpanFrame:
 
     def to_frame(self, xyz: np.ndarray) -> np.ndarray:
         """s along the span, t to its left, and z, (n, 3) m, of points (n, 3) m."""
+        return np.column_stack((*self.in_plan(xyz), xyz[:, 2]))
+
+    def in_plan(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """s along the span and t to its left, each (n,) m, of points (n, 2 or 3) m."""
         east, north = xyz[:, 0] - self.x, xyz[:, 1] - self.y
         dx, dy = self.direction
-        return np.column_stack((east * dx + north * dy, north * dx - east * dy, xyz[:, 2]))
+        return east * dx + north * dy, north * dx - east * dy
 
     def to_map(self, stz: np.ndarray) -> np.ndarray:
         """Points (n, 3) m of s, t and z (n, 3) m."""

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.clearance.kinds import HOUSE, NO_OBSTACLE, ON_GROUND, PLANT, surroundings
+from scenenet.clearance.kinds import (
+    COLUMN_M,
+    GAP,
+    GAP_M,
+    HOUSE,
+    NO_OBSTACLE,
+    ON_GROUND,
+    PLANT,
+    above_gap,
+    surroundings,
+)
 from scenenet.clearance.trees import find_trees
 from scenenet.pointcloud.class_schemes import ASPRS
 
@@ -115,3 +125,21 @@ def test_a_jib_over_open_ground_is_held_by_its_mast_and_a_flock_is_not(scene):
     kind = around.kind[len(mast) : len(mast) + len(jib) + len(flock)]
     assert (kind[: len(jib)] == PLANT).all()
     assert (kind[len(jib) :] == NO_OBSTACLE).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_points_above_a_gap_in_their_column_are_in_the_air(seed):
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(0, 10, (60, 2))
+    height = rng.normal(0, rng.choice([3.0, 15.0, 60.0]), 60) + rng.choice([0.0, 5.0, 20.0])
+    expected = np.zeros(len(xy), bool)
+    cell = np.floor(xy / COLUMN_M)
+    for place in np.unique(cell, axis=0):
+        rows = np.flatnonzero((cell == place).all(axis=1))
+        rows, below, above = rows[np.argsort(height[rows])], 0.0, False
+        if height[rows[-1]] <= GAP_M:
+            continue
+        for row in rows:
+            above |= bool(height[row] - below > max(GAP_M, GAP * height[row]))
+            expected[row], below = above, height[row]
+    np.testing.assert_array_equal(above_gap(xy, height), expected)

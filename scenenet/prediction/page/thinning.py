@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from scenenet.core.compilation import EXACT
+from scenenet.core.extent import extent
 
 STEP_M = 0.01
 """m, step of the coordinates in a picture. A pixel is wider."""
@@ -24,11 +25,12 @@ def thinned(xyz: np.ndarray, most: int) -> np.ndarray:
     """
     if len(xyz) <= most:
         return xyz
+    low, high = extent(xyz)
     # Not the lowest point of each cell: trees would look like shelves.
     xyz = np.random.default_rng(0).permutation(xyz)
-    offsets = xyz - xyz.min(axis=0)
+    offsets = xyz - low
     # Points lie on surfaces: about as many cells as points of the result cover the widest one.
-    cell = max(STEP_M, float(np.sqrt(np.prod(np.sort(offsets.max(axis=0))[1:]) / most)) / 4)
+    cell = max(STEP_M, float(np.sqrt(np.prod(np.sort(high - low)[1:]) / most)) / 4)
     kept = _one_each(offsets, cell)
     while len(kept) > most:
         # The size is found with the points that are left: they are few.

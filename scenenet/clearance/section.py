@@ -131,7 +131,7 @@ def measure(
     """
     around = look_around(area, flown, points, scheme, settings.few_points)
     here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
-    xyz, kind = around.xyz[here], around.kind[here]
+    xyz, kind = np.compress(here, around.xyz, axis=0), around.kind[here]
     last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)
     along, _ = area.frame.in_plan(xyz)
     step = np.clip((along / settings.step).astype(int), 0, last)
@@ -164,7 +164,7 @@ def look_around(
         doubtful = np.flatnonzero(found.wire & free)
         free[doubtful] = ~untraced(area.frame.to_frame(found.xyz[doubtful]))
     codes = None if found.codes is None else found.codes[free]
-    return surroundings(found.xyz[free], codes, scheme, few_points)
+    return surroundings(np.compress(free, found.xyz, axis=0), codes, scheme, few_points)
 
 
 def on_wires(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:

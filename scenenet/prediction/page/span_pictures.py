@@ -135,14 +135,14 @@ def _parts(
     narrow = Area(area.frame, area.first, area.last, half_width)
     around = look_around(area, own, points.free, prediction.scheme, few_points)
     inside = narrow.has(around.xyz)
-    xyz, kind = around.xyz[inside], around.kind[inside]
+    xyz, kind = np.compress(inside, around.xyz, axis=0), around.kind[inside]
     everything = points.all(narrow)
     free = everything.part == FREE
     of_tower = everything.part == TOWER
     wire = ~free & ~of_tower
     wire[free] = on_wires(everything.xyz[free], own)
     return [
-        *(xyz[kind == number] for number in (ON_GROUND, PLANT, HOUSE)),
+        *(np.compress(kind == number, xyz, axis=0) for number in (ON_GROUND, PLANT, HOUSE)),
         everything.xyz[wire],
         everything.xyz[of_tower],
     ]

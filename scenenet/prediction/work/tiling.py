@@ -109,19 +109,19 @@ class Lattice:
         Raises:
             InputError: a coordinate is outside the lattice.
         """
-        steps = np.floor((xyz[:, ::-1] + BORDER_M) / self.voxel_size)
-        if not (np.abs(steps) < _BIAS * EDGE).all():
-            row = int(np.argmax(~(np.abs(steps) < _BIAS * EDGE).all(axis=1)))
+        # Axis by axis, which takes half the time of all three together.
+        steps = [np.floor((xyz[:, axis] + BORDER_M) / self.voxel_size) for axis in (2, 1, 0)]
+        inside = [np.abs(step) < _BIAS * EDGE for step in steps]
+        if not all(each.all() for each in inside):
+            row = int(np.argmin(np.logical_and.reduce(inside)))
             raise InputError(
                 f"the point {xyz[row].tolist()} is too far from the origin for voxels of "
                 f"{self.voxel_size:g} m",
                 remedy="Remove stray points, or convert the survey to metres",
             )
-        steps = steps.astype(np.int64)
-        places = steps >> 6
-        local = steps & (EDGE - 1)
-        voxel = (local[:, 0] * EDGE + local[:, 1]) * EDGE + local[:, 2]
-        return _encode(places), voxel.astype(np.int32)
+        z, y, x = (step.astype(np.int64) for step in steps)
+        voxel = ((z & (EDGE - 1)) * EDGE + (y & (EDGE - 1))) * EDGE + (x & (EDGE - 1))
+        return _encode(z >> 6, y >> 6, x >> 6), voxel.astype(np.int32)
 
     def centres(self, zyx: np.ndarray) -> np.ndarray:
         """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
@@ -305,7 +305,7 @@ class TileSpool:
         low = np.asarray(place) * EDGE - reach
         shape = np.array([EDGE + 2 * r for r in reach])
         indices, counts, totals = [], [], []
-        for code in _encode(np.asarray(place) + NEIGHBOURS).tolist():
+        for code in _encode(*(np.asarray(place) + NEIGHBOURS).T).tolist():
             if code not in self._files:
                 continue
             tile = self.tile(code)
@@ -336,7 +336,7 @@ class TileSpool:
         low = np.asarray(place) * EDGE - reach
         shape = np.array([EDGE + 2 * r for r in reach])
         indices, found = [np.empty(0, np.int64)], [np.empty(0, np.float32)]
-        for code in _encode(np.asarray(place) + NEIGHBOURS).tolist():
+        for code in _encode(*(np.asarray(place) + NEIGHBOURS).T).tolist():
             if code not in self._files:
                 continue
             value, tile = values(code), self.tile(code)
@@ -416,7 +416,7 @@ def _ascending(values: np.ndarray) -> np.ndarray:
 
 def code_of(place: tuple[int, int, int]) -> int:
     """The code of the tile at ``place`` (z, y, x)."""
-    return int(_encode(np.asarray(place)[None])[0])
+    return int(_encode(*np.asarray(place)))
 
 
 def by_column(code: int) -> tuple[int, int, int]:
@@ -440,9 +440,9 @@ def groups(codes: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
         yield int(codes[rows[0]]), rows
 
 
-def _encode(places: np.ndarray) -> np.ndarray:
-    z, y, x = (places + _BIAS).T
-    return (z << (2 * _BITS)) | (y << _BITS) | x
+def _encode(z: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """The codes (n,) of the tiles at places z, y, x, each (n,)."""
+    return ((z + _BIAS) << (2 * _BITS)) | ((y + _BIAS) << _BITS) | (x + _BIAS)
 
 
 def _decode(code: int) -> tuple[int, int, int]:

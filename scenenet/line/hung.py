@@ -10,7 +10,7 @@ import numpy as np
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.frame import SpanFrame
-from scenenet.line.trace import TAUTEST_M, Wire, trace_wires
+from scenenet.line.trace import GAP_M, TAUTEST_M, Wire, trace_wires
 from scenenet.line.wire_points import WirePoints
 
 REACH_M = 16.0
@@ -113,7 +113,11 @@ class TracedSpan:
 
 
 def traced(
-    points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float = 0.0
+    points: WirePoints,
+    rows: np.ndarray,
+    frame: SpanFrame,
+    rise: float = 0.0,
+    gap: float = GAP_M,
 ) -> tuple[HungWire, ...]:
     """The wires among some points, each between its first and its last point. Points that are not
     certain count where other wires of the span show that wires hang there, and in steep spans.
@@ -124,29 +128,29 @@ def traced(
     Args:
         rows: (n,) of the points.
         frame: of the span.
-        rise: of the span, as in ``trace_wires``.
+        rise, gap: of the span, as in ``trace_wires``.
     """
-    question = frame.x, frame.y, *frame.direction.tolist(), frame.length, rise
+    question = frame.x, frame.y, *frame.direction.tolist(), frame.length, rise, gap
     key = hashlib.sha256(repr(question).encode() + rows.tobytes()).digest()
     if key not in points.answers:
-        points.answers[key] = tuple(_traced(points, rows, frame, rise))
+        points.answers[key] = tuple(_traced(points, rows, frame, rise, gap))
     return points.answers[key]
 
 
 def _traced(
-    points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float
+    points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float, gap: float
 ) -> Iterator[HungWire]:
     certain = points.certain[rows]
     stz = frame.to_frame(points.xyz[rows])
-    wires = trace_wires(stz[certain], rise)
+    wires = trace_wires(stz[certain], rise, gap)
     number = np.flatnonzero(certain)
     if not wires and abs(rise) > STEEP:
-        wires, number = trace_wires(stz, rise), np.arange(len(stz))
+        wires, number = trace_wires(stz, rise, gap), np.arange(len(stz))
     elif wires and not certain.all():
         above = np.array([wire.fit.catenary.residuals(stz)[1] for wire in wires])
         doubtful = ~certain & (above.max(axis=0) > -BELOW_M) & (above.min(axis=0) < ABOVE_M)
         number = np.flatnonzero(certain | doubtful)
-        wires = trace_wires(stz[number], rise)
+        wires = trace_wires(stz[number], rise, gap)
     for wire in wires:
         catenary = wire.fit.catenary
         taut = catenary.parameter > TAUTEST_M and catenary.length > LONG_M

@@ -11,6 +11,7 @@ from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M, SHORTES
 from scenenet.line.frame import SpanFrame
 from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.lone_wires import lone_spans
+from scenenet.line.trace import GAP_M
 from scenenet.line.wire_points import WirePoints
 
 LONGEST_M = 1200.0
@@ -35,7 +36,7 @@ that are so close to each other are about equally tall."""
 
 UNSEEN_M, UNSEEN_SHARE = 40.0, 0.35
 """m, and share of a span, that may be hidden between the first point of a wire and its tower; the
-greater of both."""
+greater of both. Between its points, as much as at both ends together."""
 
 
 def find_spans(
@@ -89,7 +90,9 @@ def _span(
         return None
     rows = points.beside(frame, REACH_M)
     rise = (last.base - first.base) / frame.length
-    wires = tuple(_between(traced(points, rows[free[rows]], frame, rise), frame, first, last))
+    gap = max(GAP_M, 2 * UNSEEN_SHARE * frame.length)
+    wires = traced(points, rows[free[rows]], frame, rise, gap)
+    wires = tuple(_between(wires, frame, first, last))
     return TracedSpan(first, last, frame, wires) if wires else None
 
 

@@ -30,7 +30,7 @@ MIN_WINDOWS = 3
 """Windows in which a wire has a piece, at least."""
 
 GAP_M = 60.0
-"""m, longest gap in a wire."""
+"""m, longest gap in a wire of which it is not known that it leads from tower to tower."""
 
 RING_M, CROWDED = 0.95, 0.5
 """m, radius of the ring around a wire, and points in it for each point of the wire from which the
@@ -80,11 +80,14 @@ class Wire:
     bundle: int = 1
 
 
-def trace_wires(stz: np.ndarray, rise: float = 0.0, limit: int = 80) -> list[Wire]:
+def trace_wires(
+    stz: np.ndarray, rise: float = 0.0, gap: float = GAP_M, limit: int = 80
+) -> list[Wire]:
     """The wires among points (n, 3) m in the frame of a span, the longest first.
 
     Args:
         rise: m per metre along the span, of the straight line between the feet of its towers.
+        gap: m, longest one in a wire.
         limit: wires, at most.
     """
     if len(stz) == 0:
@@ -110,7 +113,7 @@ def trace_wires(stz: np.ndarray, rise: float = 0.0, limit: int = 80) -> list[Wir
                 break
             support, fit = part, closer
         left[support] = False
-        wire = None if fit is None else _supported(stz, fit, free, window)
+        wire = None if fit is None else _supported(stz, fit, free, window, gap)
         if wire is None:
             continue
         # Pieces beside a wire are of its bundle or its noise.
@@ -216,7 +219,9 @@ def _near(pieces: Pieces, catenary: Catenary, beyond: float) -> np.ndarray:
     return inside & (distance <= APART_M)
 
 
-def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float) -> Wire | None:
+def _supported(
+    stz: np.ndarray, fit: Fit, free: np.ndarray, window: float, gap: float
+) -> Wire | None:
     """The wire with all its points and its true ends, or None if too little of it is seen."""
     catenary = fit.catenary
     along, left = catenary.along(stz)
@@ -228,7 +233,7 @@ def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float) -> Wi
     if not on.any():
         return None
     beside = (distance > IN_BUNDLE_M) & (distance <= RING_M)
-    seen = _clear_stretch(along[on], along[beside], window)
+    seen = _clear_stretch(along[on], along[beside], window, gap)
     if seen is None:
         return None
     low, high, covered = seen
@@ -240,7 +245,7 @@ def _supported(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float) -> Wi
 
 
 def _clear_stretch(
-    on: np.ndarray, beside: np.ndarray, window: float
+    on: np.ndarray, beside: np.ndarray, window: float, gap: float
 ) -> tuple[float, float, float] | None:
     """Where a wire hangs in free air: start and end, m along it, of the longest stretch without a
     long gap, and the share of its halves of windows that are clear. None if none is.
@@ -250,6 +255,7 @@ def _clear_stretch(
     Args:
         on, beside: m along the wire, of the points on it (n,) and of those in the ring around it.
         window: m.
+        gap: m, from which one is long.
     """
     half = window / 2
     first = np.floor(on.min() / half)
@@ -261,7 +267,7 @@ def _clear_stretch(
     clear = np.flatnonzero((n_on > 0) & (n_beside <= CROWDED * n_on))
     if len(clear) == 0:
         return None
-    gaps = np.flatnonzero(np.diff(clear) * half > GAP_M)
+    gaps = np.flatnonzero(np.diff(clear) * half > gap)
     starts, stops = np.append(0, gaps + 1), np.append(gaps, len(clear) - 1)
     longest = int(np.argmax(stops - starts))
     part = clear[starts[longest] : stops[longest] + 1]

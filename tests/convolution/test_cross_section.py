@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenenet.convolution.cross_section import neighbours, section_offsets, strongest, whole_voxels
+from scenenet.convolution.cross_section import (
+    highest,
+    neighbours,
+    section_offsets,
+    strongest,
+    whole_voxels,
+)
 from scenenet.convolution.occupancy import Occupancy
 
 SHAPE = (5, 6, 7)
@@ -21,7 +27,9 @@ def of_volume(
     occupancy: Occupancy, responses: np.ndarray, radius: float, above: float
 ) -> np.ndarray:
     section = neighbours(occupancy, section_offsets(radius, above, 1.0))
-    return responses[strongest(responses, *section)]
+    found = responses[strongest(responses, *section)]
+    np.testing.assert_array_equal(highest(responses, *section), found)
+    return found
 
 
 @pytest.mark.parametrize(

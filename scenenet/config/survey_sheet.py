@@ -23,7 +23,7 @@ from scenenet.prediction.tile_index import INDEX_SUFFIXES
 if TYPE_CHECKING:
     from scenenet.config.schema import Config
 
-Role = Literal["train", "new"]
+Role = Literal["train", "observe", "new"]
 Origin = Literal["file", "tiles", "synthetic", "ts40k"]
 
 
@@ -50,13 +50,16 @@ class SurveyRow(Settings):
     )
     path: str = Field(
         min_length=1,
-        description="LAS, LAZ, COPC, .npy or .pt file; for train also a folder of TS40K samples; "
-        "for new also a folder, a pattern or a tile index of LAS and LAZ files, which are one "
-        "survey; relative to the root of the project, or absolute; "
+        description="LAS, LAZ, COPC, .npy or .pt file; for train and observe also a folder of "
+        "TS40K samples; for new also a folder, a pattern or a tile index of LAS and LAZ files, "
+        "which are one survey; relative to the root of the project, or absolute; "
         f"{RESULTS}/synthetic/NAME.laz is a synthetic survey, .las where they are temporary",
     )
     codes: Codes = Field(description="class scheme of the labels")
-    role: Role = Field(description="train: part of the dataset; new: only classified")
+    role: Role = Field(
+        description="train: part of the dataset; observe: only observers are trained on it; new: "
+        "only classified"
+    )
     crs: str = Field(
         "",
         description="coordinate system of a new survey whose file states none, such as "
@@ -76,7 +79,7 @@ class Survey:
         name: unique; names its files.
         path: relative to the root of the project, or absolute.
         codes: class scheme of its labels.
-        role: train or new.
+        role: train, observe or new.
         origin: ``file`` for a recorded survey, ``tiles`` for one of many files, ``synthetic`` for
             one that the workflow makes, ``ts40k`` for a folder of samples.
         crs: the coordinate system if the file states none, as text; None if it is not known.
@@ -240,7 +243,7 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
 def _system_problems(text: str, role: str) -> list[str]:
     if not text:
         return []
-    if role == "train":
+    if role != "new":
         return ["crs is only for the role new; a training survey keeps the system of its file"]
     from scenenet.pointcloud.las.crs import named_system
 
@@ -299,7 +302,7 @@ def _is_tiled(where: Path) -> bool:
 
 
 def _tile_problems(path: str, where: Path, role: str) -> list[str]:
-    if role == "train":
+    if role != "new":
         return [
             f"{path} is a survey of many LAS and LAZ files, which can only be classified (role "
             "new); to train on them, give each file a row"

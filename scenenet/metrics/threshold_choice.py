@@ -31,9 +31,16 @@ def best_step(curve: ThresholdCurve, false_weight: float) -> tuple[int, float]:
     """
     tp = curve.true[::-1].cumsum()[::-1][1:]
     fp = curve.false[::-1].cumsum()[::-1][1:]
-    b2 = BETA**2
-    found = (1 + b2) * tp
-    below = found + b2 * (int(curve.true.sum()) - tp) + false_weight * fp
-    f05 = (found / np.maximum(below, 1e-12))[STEPS]
+    f05 = weighted_f05(tp, fp, int(curve.true.sum()), false_weight)[STEPS]
     highest = len(f05) - 1 - int(np.argmax(f05[::-1]))
     return int(STEPS[highest]), float(f05[highest])
+
+
+def weighted_f05(
+    tp: np.ndarray, fp: np.ndarray, labelled: np.ndarray | int, false_weight: float
+) -> np.ndarray:
+    """F0.5 if a false voxel counts ``false_weight`` times, from counts of the same shape."""
+    b2 = BETA**2
+    found = (1 + b2) * tp
+    below = found + b2 * (labelled - tp) + false_weight * fp
+    return found / np.maximum(below, 1e-12)

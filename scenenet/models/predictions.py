@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -154,11 +154,16 @@ def curve_of(
     Args:
         known: what was computed for the same crops with other mixing weights.
     """
-    total = ThresholdCurve.empty()
+    return sum(crop_curves(model, crops, known), ThresholdCurve.empty())
+
+
+def crop_curves(
+    model: MetricSceneNet, crops: Sequence[PreparedCrop], known: KnownAnswers | None = None
+) -> Iterator[ThresholdCurve]:
+    """``curve_of`` each crop."""
     with torch.no_grad():
         probabilities_of = Answers(model, known)
         for crop in crops:
             curve = ThresholdCurve.of(probabilities_of(crop), crop.tower)
             curve.false[0] += crop.n_voxels - len(crop.tower)
-            total += curve
-    return total
+            yield curve

@@ -109,6 +109,12 @@ class MetricSettings(Settings):
         "above 1 because models find more false positives on other data than on their training "
         "crops",
     )
+    crops: Literal["pooled", "alike"] = Field(
+        "pooled",
+        description="what a crop counts in the F0.5 that selects parameters and tau; pooled: as "
+        "much as it has voxels; alike: as much as any other, so that crops with many voxels of the "
+        "target do not outvote those with few",
+    )
     observed: float = Field(
         1.0,
         ge=0.1,
@@ -133,7 +139,7 @@ class MetricSettings(Settings):
         """Settings of later versions stand in records only where they differ from what every
         earlier version did, so that the records of its models stay the same."""
         raw: dict[str, Any] = dump(self)
-        for name in ("observed", "mixing"):
+        for name in ("crops", "observed", "mixing"):
             if getattr(self, name) == type(self).model_fields[name].default:
                 raw.pop(name, None)
         return raw
@@ -145,8 +151,8 @@ class SearchSettings(Settings):
     result: Literal["best", "middle"] = Field(
         "best",
         description="best: the numbers with the highest score; middle: the mean of all random "
-        "initial points whose score is hardly lower than the highest, for numbers that few crops "
-        "do not determine. There are no generations then",
+        "initial points whose score lies within one standard error of the highest, for numbers "
+        "that few crops do not determine. There are no generations then",
     )
     searches: int = Field(4, ge=1, description="searches started; only the best continues")
     trial: int = Field(15, ge=0, description="generations after which the best search is chosen")

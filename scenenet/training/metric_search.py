@@ -12,20 +12,19 @@ import pandas as pd
 from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.metrics.score_columns import or_nan
+from scenenet.metrics.threshold_choice import best_step
+from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.models.factory import new_model
 from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.predictions import PreparedCrop, curve_of, prepare_crops
+from scenenet.models.predictions import PreparedCrop, crop_curves, prepare_crops
 from scenenet.models.settings import ModelSettings, SearchSettings
 from scenenet.training import checkpoint as checkpoints
 from scenenet.training.determination import evidence
 from scenenet.training.evolution import Score, State, advance, begin, settled
 from scenenet.training.measured_numbers import FreeNumbers, measure
 from scenenet.training.objective import draws, scorer
-
-HARDLY_LESS = 0.02
-"""Loss of score that is within the chance of having these crops and not others: scores on six crops
-differ by more."""
+from scenenet.training.one_error import left_out, within_one_error
 
 
 def fit_by_search(
@@ -54,15 +53,14 @@ def fit_by_search(
     free = FreeNumbers(model, measured)
     learnt = prepare_crops(model, training, settings.measurement)
     kept = prepare_crops(model, validation, settings.measurement)
-    score = scorer(free, learnt)
     if settings.search.result == "middle":
-        history = [_middle(free, score, settings, seed, kept)]
+        history = [_middle(free, learnt, settings, seed, kept)]
     else:
-        history = _generations(free, score, settings, seed, kept, checkpoint)
+        history = _generations(free, scorer(free, learnt), settings, seed, kept, checkpoint)
     if with_evidence:
         known = KnownAnswers()
         model.evidence = evidence(
-            model, measured, lambda: model.best_step(curve_of(model, learnt, known))[1]
+            model, measured, lambda: model.best_step(crop_curves(model, learnt, known))[1]
         )
     return model, pd.DataFrame(history)
 
@@ -105,29 +103,35 @@ def _generations(
 
 def _middle(
     free: FreeNumbers,
-    score: Score,
+    crops: Sequence[PreparedCrop],
     settings: ModelSettings,
     seed: int,
     kept: Sequence[PreparedCrop],
 ) -> dict[str, Any]:
-    """Set the mean of all draws that score hardly less than the best one; the row of the history.
+    """Set the mean of all draws that score as well as the best one, as far as the crops can tell
+    (``scenenet.training.one_error``); the row of the history.
 
     Where the score is the same over a wide range, the best draw lies anywhere in it, and the middle
     is furthest from the numbers that do not fit.
     """
-    started, model = time.perf_counter(), free.model
+    started, model, known = time.perf_counter(), free.model, KnownAnswers()
     drawn = free.of(draws(model, settings.search.starts, np.random.default_rng([seed, 0])))
     label = f"{settings.name} seed {seed}: draws"
-    scores = np.array([score(one) for one in track(list(drawn), label)])
-    good = []
-    for one in drawn[scores >= scores.max() - HARDLY_LESS]:
+    numbers, scores, without = [], [], []
+    for one in track(list(drawn), label):
         free.set(one)
-        good.append(model.shape_parameters())
+        curves = list(model.weighed(crop_curves(model, crops, known)))
+        step, score = best_step(sum(curves, ThresholdCurve.empty()), model.metric.false_weight)
+        numbers.append(model.shape_parameters())
+        scores.append(score)
+        without.append(left_out(curves, step, model.metric.false_weight))
+    within = within_one_error(np.array(scores), np.array(without))
+    good = [of for of, is_good in zip(numbers, within, strict=True) if is_good]
     # Means of weights that sum to one sum to one, and means of bounded lengths stay in bounds.
     model.set_shape_parameters(
-        {name: float(np.mean([numbers[name] for numbers in good])) for name in good[0]}
+        {name: float(np.mean([of[name] for of in good])) for name in good[0]}
     )
-    reached = score(free.of(model.numbers()))
+    _, reached = model.best_step(crop_curves(model, crops, known))
     return _row(model, 1, reached, kept, time.perf_counter() - started)
 
 
@@ -158,9 +162,9 @@ def _row(
     row["seconds"] = seconds
     row |= {"validation_loss": float("nan"), "validation_f05": float("nan")}
     if kept:
-        curve = curve_of(model, kept)
-        row["validation_loss"] = 1 - model.best_step(curve)[1]
-        row["validation_f05"] = or_nan(curve.best()[1].f05)
+        curves = list(crop_curves(model, kept))
+        row["validation_loss"] = 1 - model.best_step(curves)[1]
+        row["validation_f05"] = or_nan(sum(curves, ThresholdCurve.empty()).best()[1].f05)
     return row | model.shape_parameters()
 
 

@@ -1,4 +1,4 @@
-"""The middle of the draws that score hardly less than the best one."""
+"""The middle of the draws that score as well as the best one, as far as the crops can tell."""
 
 from __future__ import annotations
 

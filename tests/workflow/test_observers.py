@@ -1,4 +1,4 @@
-"""An observer in the workflow: trained on squares of the training surveys, and scored on others."""
+"""An observer in the workflow: trained on squares of the training surveys and of one of its own."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def made(project_in, project_root: Path, tmp_path_factory) -> Project:
     own = {"results_dir": "results", "surveys": "config/surveys.tsv", "studies": []}
     project.configure({**test, **own})
     (project.folder / "config" / "surveys.tsv").write_text("survey\tpath\tcodes\trole\n")
-    for name in ("first", "second"):
-        project.add_row(name, f"{{results_dir}}/synthetic/{name}.laz", "edp", "train")
+    for name, role in (("first", "train"), ("second", "observe")):
+        project.add_row(name, f"{{results_dir}}/synthetic/{name}.laz", "edp", role)
     project.run("--cores", "1", MODEL)
     return project
 
@@ -38,7 +38,9 @@ def test_it_finds_wires_and_is_scored_on_squares_that_it_has_not_seen(made):
     _, card = read_model(made.results / "models" / "wires.json")
     assert (card.target, card.voxel_size) == ("wire", 1.0)
     with (made.results / "square_split/wires/split.csv").open(newline="") as stream:
-        parts = [row["part"] for row in csv.DictReader(stream)]
+        rows = list(csv.DictReader(stream))
+    parts = [row["part"] for row in rows]
+    assert {row["survey"] for row in rows} == {"first", "second"}
     scores = read_json(made.results / "evaluate/wires/seed-0.json")
     assert scores["voxel"]["n_samples"] == parts.count("test") > 0
     assert card.provenance["training_crops"] == parts.count("train") > 0
@@ -51,6 +53,11 @@ def test_its_card_has_the_points_that_it_found(made):
     card = (made.results / "packaged" / "wires.md").read_text(encoding="utf-8")
     truth = read_json(made.results / "evaluate/wires/seed-0.json")["truth"]["points"]
     assert f"| against the truth | {truth['precision']:.2f} | {truth['recall']:.2f} |" in card
+
+
+def test_models_of_towers_do_not_see_the_surveys_of_observers(made):
+    planned = made.planned("results/split/split.csv")
+    assert (planned["towers"], planned["crops"]) == (1, 1)
 
 
 def test_what_runs_again_is_what_depends_on_a_change(made):

@@ -239,7 +239,9 @@ PREDICT = {
 GRID = settings.voxels.label
 # Sorted, so that the order of the rows in the survey sheet does not matter.
 TRAIN = sorted(filter(trained_on, SURVEYS))
-NEW = sorted(set(SURVEYS) - set(TRAIN))
+# The surveys that observers are trained on.
+OBSERVE = sorted(survey for survey in SURVEYS if SURVEYS[survey].role != "new")
+NEW = sorted(set(SURVEYS) - set(OBSERVE))
 # New surveys of many files, and of one. Tile by tile there is neither a check nor a picture.
 TILED = sorted(PLANS)
 WHOLE = [survey for survey in NEW if survey not in PLANS]
@@ -266,7 +268,7 @@ STUDY_JOBS = {
 
 # Wildcard -> its values. A rule that is for some of them only says so in its own constraints.
 VALUES = {
-    "survey": [*TRAIN, *NEW],
+    "survey": [*OBSERVE, *NEW],
     "model": [model.name for model in settings.models],
     "observer": [observer.name for observer in settings.observers],
     "seed": list(settings.seeds),

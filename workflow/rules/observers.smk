@@ -1,4 +1,5 @@
-"""Observers: models of other targets, trained on squares of the training surveys that hold the target.
+"""Observers: models of other targets, trained on squares that hold the target, of the surveys with the roles ``train``
+and ``observe``.
 
 They have the stages of the models of towers, on crops of their own, and are trained from one seed.
 """
@@ -17,7 +18,7 @@ rule squares:
     benchmark:
         f"{R}/benchmarks/squares/{{observer}}-{{survey}}.tsv"
     wildcard_constraints:
-        survey=any_of(TRAIN),
+        survey=any_of(OBSERVE),
     conda:
         "../envs/scenenet.yaml"
     threads: 1
@@ -52,7 +53,7 @@ rule square_voxels:
     benchmark:
         f"{R}/benchmarks/square_voxels/{{observer}}-{{survey}}.tsv"
     wildcard_constraints:
-        survey=any_of(TRAIN),
+        survey=any_of(OBSERVE),
     conda:
         "../envs/scenenet.yaml"
     threads: 1

@@ -42,7 +42,7 @@ rule check:
     benchmark:
         f"{R}/benchmarks/check/{{survey}}.tsv"
     wildcard_constraints:
-        survey=any_of([*TRAIN, *WHOLE]),
+        survey=any_of([*OBSERVE, *WHOLE]),
     priority: 1
     conda:
         "../envs/scenenet.yaml"

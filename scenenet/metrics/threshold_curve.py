@@ -55,16 +55,6 @@ class ThresholdCurve:
     def __add__(self, other: ThresholdCurve) -> ThresholdCurve:
         return ThresholdCurve(self.true + other.true, self.false + other.false)
 
-    def per_million(self) -> ThresholdCurve:
-        """The counts per million labelled voxels, rounded, so that curves with few and with many
-        labelled voxels weigh the same in a sum; unchanged without labelled voxels."""
-        labelled = int(self.true.sum())
-        share = 1e6 / labelled if labelled else 1.0
-        true, false = (
-            np.rint(counts * share).astype(np.int64) for counts in (self.true, self.false)
-        )
-        return ThresholdCurve(true, false)
-
     @property
     def tau(self) -> np.ndarray:
         """The thresholds, (650,), ascending."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Self
 
 import numpy as np
@@ -251,17 +251,11 @@ class MetricSceneNet(GeneoModel):
 
     def best_tau(self, curve: ThresholdCurve) -> float:
         """tau with the highest F0.5 when a false voxel counts ``metric.false_weight`` times."""
-        return float(curve.tau[self.best_step([curve])[0]])
+        return float(curve.tau[self.best_step(curve)[0]])
 
-    def best_step(self, curves: Iterable[ThresholdCurve]) -> tuple[int, float]:
-        """Number of the best threshold for the curves of crops, and the weighted F0.5 at it."""
-        total = sum(self.weighed(curves), ThresholdCurve.empty())
-        return best_step(total, self.metric.false_weight)
-
-    def weighed(self, curves: Iterable[ThresholdCurve]) -> Iterator[ThresholdCurve]:
-        """The curves of some crops, each counting as ``metric.crops`` says."""
-        for curve in curves:
-            yield curve.per_million() if self.metric.crops == "alike" else curve
+    def best_step(self, curve: ThresholdCurve) -> tuple[int, float]:
+        """Index of ``best_tau`` in the thresholds, and the weighted F0.5 at it."""
+        return best_step(curve, self.metric.false_weight)
 
     @property
     def reach(self) -> tuple[int, int, int]:

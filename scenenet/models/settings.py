@@ -109,12 +109,6 @@ class MetricSettings(Settings):
         "above 1 because models find more false positives on other data than on their training "
         "crops",
     )
-    crops: Literal["pooled", "alike"] = Field(
-        "pooled",
-        description="what a crop counts in the F0.5 that selects parameters and tau; pooled: as "
-        "much as it has voxels; alike: as much as any other, so that crops with many voxels of the "
-        "target do not outvote those with few",
-    )
     observed: float = Field(
         1.0,
         ge=0.1,
@@ -139,7 +133,7 @@ class MetricSettings(Settings):
         """Settings of later versions stand in records only where they differ from what every
         earlier version did, so that the records of its models stay the same."""
         raw: dict[str, Any] = dump(self)
-        for name in ("crops", "observed", "mixing"):
+        for name in ("observed", "mixing"):
             if getattr(self, name) == type(self).model_fields[name].default:
                 raw.pop(name, None)
         return raw

@@ -12,12 +12,11 @@ import pandas as pd
 from scenenet.core.progress import track
 from scenenet.dataset.voxels import VoxelSample
 from scenenet.metrics.score_columns import or_nan
-from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.models.factory import new_model
 from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.predictions import PreparedCrop, crop_curves, prepare_crops
+from scenenet.models.predictions import PreparedCrop, crop_curves, curve_of, prepare_crops
 from scenenet.models.settings import ModelSettings, SearchSettings
 from scenenet.training import checkpoint as checkpoints
 from scenenet.training.determination import evidence
@@ -60,7 +59,7 @@ def fit_by_search(
     if with_evidence:
         known = KnownAnswers()
         model.evidence = evidence(
-            model, measured, lambda: model.best_step(crop_curves(model, learnt, known))[1]
+            model, measured, lambda: model.best_step(curve_of(model, learnt, known))[1]
         )
     return model, pd.DataFrame(history)
 
@@ -120,8 +119,8 @@ def _middle(
     numbers, scores, without = [], [], []
     for one in track(list(drawn), label):
         free.set(one)
-        curves = list(model.weighed(crop_curves(model, crops, known)))
-        step, score = best_step(sum(curves, ThresholdCurve.empty()), model.metric.false_weight)
+        curves = list(crop_curves(model, crops, known))
+        step, score = model.best_step(sum(curves, ThresholdCurve.empty()))
         numbers.append(model.shape_parameters())
         scores.append(score)
         without.append(left_out(curves, step, model.metric.false_weight))
@@ -131,7 +130,7 @@ def _middle(
     model.set_shape_parameters(
         {name: float(np.mean([of[name] for of in good])) for name in good[0]}
     )
-    _, reached = model.best_step(crop_curves(model, crops, known))
+    _, reached = model.best_step(curve_of(model, crops, known))
     return _row(model, 1, reached, kept, time.perf_counter() - started)
 
 
@@ -162,9 +161,9 @@ def _row(
     row["seconds"] = seconds
     row |= {"validation_loss": float("nan"), "validation_f05": float("nan")}
     if kept:
-        curves = list(crop_curves(model, kept))
-        row["validation_loss"] = 1 - model.best_step(curves)[1]
-        row["validation_f05"] = or_nan(sum(curves, ThresholdCurve.empty()).best()[1].f05)
+        curve = curve_of(model, kept)
+        row["validation_loss"] = 1 - model.best_step(curve)[1]
+        row["validation_f05"] = or_nan(curve.best()[1].f05)
     return row | model.shape_parameters()
 
 

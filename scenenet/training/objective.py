@@ -15,7 +15,7 @@ import numpy as np
 
 from scenenet.models.known_answers import KnownAnswers
 from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.predictions import PreparedCrop, crop_curves
+from scenenet.models.predictions import PreparedCrop, curve_of
 from scenenet.training.evolution import Score
 from scenenet.training.measured_numbers import FreeNumbers
 
@@ -27,7 +27,7 @@ def scorer(free: FreeNumbers, crops: Sequence[PreparedCrop]) -> Score:
 
     def score(numbers: np.ndarray) -> float:
         free.set(numbers)
-        return free.model.best_step(crop_curves(free.model, crops, known))[1]
+        return free.model.best_step(curve_of(free.model, crops, known))[1]
 
     return score
 

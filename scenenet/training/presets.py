@@ -43,7 +43,6 @@ OBSERVERS: Mapping[str, Mapping[str, Any]] = {
         "metric": {
             "observed": 0.5,
             "false_weight": ELSEWHERE * OF_INTERSECTION,
-            "crops": "alike",  # bundles have many times the voxels of thin wires
             "whole_towers": False,
             # The strongest response within a metre: insulators and jumpers are no straight lines.
             "section_radius": 1.0,

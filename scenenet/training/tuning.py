@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenenet.dataset.voxels import VoxelSample
-from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve, curve_columns
+from scenenet.metrics.threshold_curve import ThresholdCurve, curve_columns
 from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.base import VoxelModel
-from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard
-from scenenet.models.predictions import crop_curves, prepare_crops, threshold_curve
+from scenenet.models.predictions import threshold_curve
 from scenenet.models.settings import TuningSettings
 from scenenet.training.tuning_result import TriedSize, Tuning
 
@@ -51,14 +50,9 @@ def tuned_tau(
     """tau, and the scores on ``validation`` at every tau.
 
     Args:
-        training: crops the model was trained on; used for a SCENE-Net in metres.
+        training: crops the model was trained on; used where ``model.tau_from_training``.
     """
-    if not isinstance(model, MetricSceneNet):
-        curve = threshold_curve(model, validation, measurement)
+    curve = threshold_curve(model, validation, measurement)
+    if not model.tau_from_training:
         return model.best_tau(curve), curve
-    kept, learnt = (
-        list(crop_curves(model, prepare_crops(model, samples, measurement)))
-        for samples in (validation, training)
-    )
-    step, _ = model.best_step([*kept, *learnt])
-    return float(THRESHOLDS[step]), sum(kept, ThresholdCurve.empty())
+    return model.best_tau(curve + threshold_curve(model, training, measurement)), curve

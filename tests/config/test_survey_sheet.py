@@ -130,7 +130,10 @@ def test_an_absolute_path_is_not_changed(root):
         ("north\tdata/nort.laz\tedp\ttrain", "did you mean data/north.laz?"),
         ("north\tdatta/north.laz\tedp\ttrain", "nor is its folder"),
         ("north\tdata/north.laz\tepd\ttrain", "codes 'epd' is none of edp, asprs, ts40k, did"),
-        ("north\tdata/north.laz\tedp\ttraining", "role 'training' is none of train, observe, new, did you"),
+        (
+            "north\tdata/north.laz\tedp\ttraining",
+            "role 'training' is none of train, observe, new, did you",
+        ),
         ("no rth/1\tdata/north.laz\tedp\ttrain", "such as 'no_rth_1'"),
         ("\tdata/north.laz\tedp\ttrain", "survey is empty"),
         ("north\tdata/north.laz\tedp", "role is empty"),

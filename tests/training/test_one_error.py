@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from scenenet.metrics.threshold_choice import best_step
-from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve
-from scenenet.models.metric_scenenet import MetricSceneNet
-from scenenet.models.settings import MetricSettings
+from scenenet.metrics.threshold_curve import ThresholdCurve
 from scenenet.training.one_error import left_out, within_one_error
 
 
@@ -42,16 +40,3 @@ def test_a_lead_that_every_crop_shows_counts_and_one_that_few_show_does_not():
 
 def test_one_crop_tells_no_error():
     assert within_one_error(np.array([0.8, 0.9]), np.zeros((2, 1))).tolist() == [False, True]
-
-
-@pytest.mark.parametrize("crops", ["pooled", "alike"])
-def test_crops_with_many_voxels_outvote_others_only_where_they_are_pooled(crops):
-    """The thin wires need a low tau, at which the bundle has false voxels."""
-    nothing = np.zeros(len(THRESHOLDS) + 1, int)
-    (low,), (high,) = np.searchsorted(THRESHOLDS, [[0.1], [0.5]])
-    bundle, thin = (ThresholdCurve(nothing.copy(), nothing.copy()) for _ in range(2))
-    bundle.true[high], bundle.false[low] = 9000, 6000
-    thin.true[high], thin.true[low] = 40, 60
-    model = MetricSceneNet(metric=MetricSettings(crops=crops, false_weight=0.25))
-    step, _ = model.best_step([bundle, *[thin] * 3])
-    assert (step < low) == (crops == "alike")

@@ -22,7 +22,7 @@ from scenenet.training import checkpoint as checkpoints
 from scenenet.training.determination import evidence
 from scenenet.training.evolution import Score, State, advance, begin, settled
 from scenenet.training.measured_numbers import FreeNumbers, measure
-from scenenet.training.objective import draws, scorer
+from scenenet.training.objective import draws, near_the_best, scorer
 from scenenet.training.one_error import left_out, within_one_error
 
 
@@ -108,22 +108,29 @@ def _middle(
     kept: Sequence[PreparedCrop],
 ) -> dict[str, Any]:
     """Set the mean of all draws that score as well as the best one, as far as the crops can tell
-    (``scenenet.training.one_error``); the row of the history.
+    (``scenenet.training.one_error``); the row of the history. Half of the draws are over the whole
+    range, the others near the best of these.
 
     Where the score is the same over a wide range, the best draw lies anywhere in it, and the middle
     is furthest from the numbers that do not fit.
     """
     started, model, known = time.perf_counter(), free.model, KnownAnswers()
-    drawn = free.of(draws(model, settings.search.starts, np.random.default_rng([seed, 0])))
-    label = f"{settings.name} seed {seed}: draws"
+    rng = np.random.default_rng([seed, 0])
+    over_all = free.of(draws(model, (settings.search.starts + 1) // 2, rng))
     numbers, scores, without = [], [], []
-    for one in track(list(drawn), label):
-        free.set(one)
-        curves = list(crop_curves(model, crops, known))
-        step, score = model.best_step(sum(curves, ThresholdCurve.empty()))
-        numbers.append(model.shape_parameters())
-        scores.append(score)
-        without.append(left_out(curves, step, model.metric.false_weight))
+
+    def look(drawn: np.ndarray, where: str) -> None:
+        for one in track(list(drawn), f"{settings.name} seed {seed}: draws {where}"):
+            free.set(one)
+            curves = list(crop_curves(model, crops, known))
+            step, score = model.best_step(sum(curves, ThresholdCurve.empty()))
+            numbers.append(model.shape_parameters())
+            scores.append(score)
+            without.append(left_out(curves, step, model.metric.false_weight))
+
+    look(over_all, "over the whole range")
+    if settings.search.starts > len(over_all):
+        look(near_the_best(over_all, scores, settings.search.starts // 2, rng), "near the best")
     within = within_one_error(np.array(scores), np.array(without))
     good = [of for of, is_good in zip(numbers, within, strict=True) if is_good]
     # Means of weights that sum to one sum to one, and means of bounded lengths stay in bounds.

@@ -19,6 +19,11 @@ from scenenet.models.predictions import PreparedCrop, curve_of
 from scenenet.training.evolution import Score
 from scenenet.training.measured_numbers import FreeNumbers
 
+BEST_SHARE = 0.2
+"""Share of the draws over the whole range that further ones are drawn around."""
+LEAST_BEST = 4
+"""Fewest of them: fewer say little about the spread."""
+
 
 def scorer(free: FreeNumbers, crops: Sequence[PreparedCrop]) -> Score:
     """A function from a set of free numbers (F,) to the weighted F0.5 at its own best tau."""
@@ -40,3 +45,23 @@ def draws(model: MetricSceneNet, n: int, rng: np.random.Generator) -> np.ndarray
         weights = np.maximum(rng.dirichlet(np.ones(len(stage.names)), n), 1e-3)
         drawn += [np.log(share / (1 - share)), np.log(weights[:, :-1] / weights[:, -1:])]
     return np.concatenate(drawn, axis=1)
+
+
+def near_the_best(
+    drawn: np.ndarray, scores: Sequence[float], n: int, rng: np.random.Generator
+) -> np.ndarray:
+    """(n, F) sets of free numbers around the best ``BEST_SHARE`` of those that were ``drawn``.
+
+    They are normal, with the mean and the covariance of the best ones (the cross-entropy method:
+    Rubinstein, "The Cross-Entropy Method for Combinatorial and Continuous Optimization", 1999).
+
+    Args:
+        drawn: (D, F) sets of free numbers.
+        scores: of each of them.
+    """
+    kept = min(len(drawn), max(LEAST_BEST, round(BEST_SHARE * len(drawn))))
+    best = drawn[np.argsort(scores, kind="stable")[-kept:]]
+    spread = (
+        np.atleast_2d(np.cov(best, rowvar=False)) if kept > 1 else np.zeros((best.shape[1],) * 2)
+    )
+    return rng.multivariate_normal(best.mean(axis=0), spread, n, method="eigh")

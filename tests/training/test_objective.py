@@ -23,7 +23,7 @@ from scenenet.models.predictions import (
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import MetricSettings
 from scenenet.training.evolution import NEAR_BEST, State, advance, begin, settled
-from scenenet.training.objective import draws
+from scenenet.training.objective import draws, near_the_best
 
 
 def model(seed: int = 0) -> SceneNet:
@@ -130,3 +130,14 @@ def test_a_search_goes_on_from_its_seed_and_scores_as_if_it_had_not_stopped():
         state, kept = advance(state, bowl), advance(kept, bowl)
     np.testing.assert_array_equal(kept.scores, state.scores)
     np.testing.assert_array_equal(settled(kept, bowl).best, settled(state, bowl).best)
+
+
+def test_further_draws_lie_where_the_best_ones_are():
+    rng = np.random.default_rng(0)
+    drawn = rng.uniform(-5, 5, (60, 2))
+    scores = -np.abs(drawn - [2, -1]).sum(axis=1)
+    near = near_the_best(drawn, scores, 200, rng)
+    assert near.shape == (200, 2)
+    assert np.abs(near.mean(axis=0) - [2, -1]).max() < 0.7
+    assert near.std(axis=0).max() < 0.5 * drawn.std(axis=0).min()
+    assert near_the_best(drawn[:1], scores[:1], 3, rng) == pytest.approx(np.tile(drawn[0], (3, 1)))

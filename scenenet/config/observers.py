@@ -9,6 +9,7 @@ from typing import Any, Self
 from pydantic import Field, ValidationError, model_validator
 
 from scenenet.core.settings import Settings, changed
+from scenenet.dataset.split import SplitSettings
 from scenenet.dataset.square_settings import SquareSettings
 from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL, VoxelSettings
 from scenenet.measurement.registry import PRESENCE
@@ -40,6 +41,9 @@ class ObserverSettings(Settings):
         + f", and {OTHER_VOXEL_M:g} for others",
     )
     square: SquareSettings = SquareSettings()
+    split: SplitSettings | None = Field(
+        None, description="shares of its squares; null for those of `split`"
+    )
     changes: Mapping[str, Any] = Field(
         {},
         description="settings of its model, by dotted name as in `models`, that differ from those "

@@ -36,12 +36,13 @@ on labelled surveys of your own region may be better: `scenenet train --target w
 
 ## Limits
 
-- It has seen synthetic surveys only: lines of poles and pylons from 14 to 30 m high.
+- It has seen synthetic surveys only: lines of poles and pylons from 14 to 50 m high, with single
+  wires and bundles of two and of four.
 - Jibs of cranes, fences and edges of roofs may count as wires. Insulators and jumpers mostly do
   not.
 - A single thin wire that few pulses hit is found in part, or not at all.
-- Bundles with many points on each wire are found in part: of bundles of four at 60 pulses per m2
-  most points are lost (docs/method/observers.md).
+- Bundles of four with many points on each wire are found in part near towers
+  (docs/method/observers.md).
 - Its probability ranks points of one survey. It is not the share of right answers.
 - Look at every result before you act on it.
 
@@ -91,7 +92,8 @@ def write_observer_card(
     found = results.observer(name)
     if found is None:
         raise InputError("it was not evaluated, so it has no card", file=model)
-    parts = pd.read_csv(split)["part"].value_counts().to_dict()
+    squares = pd.read_csv(split)
+    parts = squares["part"].value_counts().to_dict()
     trained, card = read_model(model)
     text = TEXT.format(
         name=name,
@@ -99,7 +101,7 @@ def write_observer_card(
         digest=sha256(model),
         target=card.target,
         parameters=trained.n_parameters(),
-        surveys=", ".join(results.surveys),
+        surveys=", ".join(sorted(set(squares["survey"]))),
         training=parts.get("train", 0),
         validation=parts.get("validation", 0),
         test=parts.get("test", 0),

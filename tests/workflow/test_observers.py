@@ -67,6 +67,10 @@ def test_what_runs_again_is_what_depends_on_a_change(made):
     observer = {"name": "wires", "target": "wire", "voxel_size": 1}
     made.configure({"observers": [{**observer, "changes": {"search.starts": 3}}]})
     assert made.planned(MODEL) == TRAINED
+    usual = {**observer, "changes": {"search.starts": 2}}
+    shares = {"train": 0.5, "validation": 0.2, "test": 0.3, "stretch": 1}
+    made.configure({"observers": [{**usual, "split": shares}]})
+    assert made.planned(MODEL) == {"square_split": 1, **TRAINED}
     made.configure(
         {"observers": [{**observer, "changes": {"search.starts": 2}, "square": {"edge": 40}}]}
     )

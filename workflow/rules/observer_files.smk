@@ -13,6 +13,11 @@ def grid_of(w):
     return OBSERVED[w.observer].grid().model_dump(mode="json")
 
 
+def split_of(w):
+    own = OBSERVED[w.observer].split
+    return SETTINGS["split"] if own is None else own.model_dump(mode="json")
+
+
 def squares_of(output):
     """An output of the squares of an observer in each training survey."""
     return lambda w: every("squares", output, observer=[w.observer])

@@ -87,8 +87,8 @@ rule square_split:
     params:
         job=lambda w: job(
             "square_split",
-            SETTINGS["split"],
-            seed=SETTINGS["split"]["seed"],
+            split_of(w),
+            seed=split_of(w)["seed"],
             observer=w.observer,
             target=finds(w),
         ),

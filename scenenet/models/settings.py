@@ -73,6 +73,18 @@ TargetText = Annotated[str, AfterValidator(canonical)]
 Length = Annotated[float, Field(ge=0, le=LARGEST_LENGTH)]
 
 
+def _without_defaults(
+    settings: Settings, dump: SerializerFunctionWrapHandler, *names: str
+) -> dict[str, Any]:
+    """Settings of later versions stand in records only where they differ from what every earlier
+    version did, so that the records of its models stay the same."""
+    raw: dict[str, Any] = dump(settings)
+    for name in names:
+        if getattr(settings, name) == type(settings).model_fields[name].default:
+            raw.pop(name, None)
+    return raw
+
+
 class MetricSettings(Settings):
     """The fixed lengths and rules of a SCENE-Net in metres. docs/method/operational_protocol.md
     gives the reasons."""
@@ -130,13 +142,7 @@ class MetricSettings(Settings):
 
     @model_serializer(mode="wrap")
     def _without_new(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Settings of later versions stand in records only where they differ from what every
-        earlier version did, so that the records of its models stay the same."""
-        raw: dict[str, Any] = dump(self)
-        for name in ("observed", "mixing"):
-            if getattr(self, name) == type(self).model_fields[name].default:
-                raw.pop(name, None)
-        return raw
+        return _without_defaults(self, dump, "observed", "mixing")
 
 
 class SearchSettings(Settings):
@@ -145,8 +151,22 @@ class SearchSettings(Settings):
     result: Literal["best", "middle"] = Field(
         "best",
         description="best: the numbers with the highest score; middle: the mean of all random "
-        "initial points whose score lies within one standard error of the highest, for numbers "
-        "that few crops do not determine. There are no generations then",
+        "initial points whose score is hardly lower than the highest, for numbers that few crops "
+        "do not determine. There are no generations then",
+    )
+    hardly: float | None = Field(
+        0.02,
+        ge=0,
+        description="middle: how much lower that is, for crops of one kind of line, which do not "
+        "tell; null for one standard error of the difference between the crops, where they are "
+        "many and of several kinds (docs/method/decisions.md)",
+    )
+    near_best: float = Field(
+        0.0,
+        ge=0,
+        lt=1,
+        description="middle: share of the initial points that are drawn around the best of the "
+        "others, which the whole range hides where few of them are good",
     )
     searches: int = Field(4, ge=1, description="searches started; only the best continues")
     trial: int = Field(15, ge=0, description="generations after which the best search is chosen")
@@ -159,11 +179,7 @@ class SearchSettings(Settings):
 
     @model_serializer(mode="wrap")
     def _without_new(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """As for ``MetricSettings``."""
-        raw: dict[str, Any] = dump(self)
-        if self.result == "best":
-            raw.pop("result", None)
-        return raw
+        return _without_defaults(self, dump, "result", "hardly", "near_best")
 
 
 class LossSettings(Settings):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -107,16 +108,16 @@ def _middle(
     seed: int,
     kept: Sequence[PreparedCrop],
 ) -> dict[str, Any]:
-    """Set the mean of all draws that score as well as the best one, as far as the crops can tell
-    (``scenenet.training.one_error``); the row of the history. Half of the draws are over the whole
-    range, the others near the best of these.
+    """Set the mean of all draws that score hardly less than the best one (``search.hardly``); the
+    row of the history.
 
     Where the score is the same over a wide range, the best draw lies anywhere in it, and the middle
     is furthest from the numbers that do not fit.
     """
     started, model, known = time.perf_counter(), free.model, KnownAnswers()
-    rng = np.random.default_rng([seed, 0])
-    over_all = free.of(draws(model, (settings.search.starts + 1) // 2, rng))
+    search, rng = settings.search, np.random.default_rng([seed, 0])
+    near = math.floor(search.near_best * search.starts)
+    over_all = free.of(draws(model, search.starts - near, rng))
     numbers, scores, without = [], [], []
 
     def look(drawn: np.ndarray, where: str) -> None:
@@ -129,16 +130,20 @@ def _middle(
             without.append(left_out(curves, step, model.metric.false_weight))
 
     look(over_all, "over the whole range")
-    if settings.search.starts > len(over_all):
-        look(near_the_best(over_all, scores, settings.search.starts // 2, rng), "near the best")
-    within = within_one_error(np.array(scores), np.array(without))
+    if near:
+        look(near_the_best(over_all, scores, near, rng), "near the best")
+    reached = np.array(scores)
+    if search.hardly is None:
+        within = within_one_error(reached, np.array(without))
+    else:
+        within = reached >= reached.max() - search.hardly
     good = [of for of, is_good in zip(numbers, within, strict=True) if is_good]
     # Means of weights that sum to one sum to one, and means of bounded lengths stay in bounds.
     model.set_shape_parameters(
         {name: float(np.mean([of[name] for of in good])) for name in good[0]}
     )
-    _, reached = model.best_step(curve_of(model, crops, known))
-    return _row(model, 1, reached, kept, time.perf_counter() - started)
+    _, score = model.best_step(curve_of(model, crops, known))
+    return _row(model, 1, score, kept, time.perf_counter() - started)
 
 
 def _trial(

@@ -45,7 +45,8 @@ def model(mixing: str) -> MetricSceneNet:
     metric = MetricSettings(
         mixing=mixing, numbers="searched", whole_towers=False, section_radius=0, section_above=0
     )
-    found = MetricSceneNet(("blob", "cylinder"), metric)
+    generator = torch.Generator().manual_seed(0)
+    found = MetricSceneNet(("blob", "cylinder"), metric, generator=generator)
     numbers = found.shape_parameters() | {"lambda.blob": 0.75, "lambda.cylinder": 0.25}
     found.set_shape_parameters(numbers)
     return found

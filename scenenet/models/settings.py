@@ -157,16 +157,16 @@ class SearchSettings(Settings):
     hardly: float | None = Field(
         0.02,
         ge=0,
-        description="middle: how much lower that is, for crops of one kind of line, which do not "
-        "tell; null for one standard error of the difference between the crops, where they are "
-        "many and of several kinds (docs/method/decisions.md)",
+        description="middle: loss of score up to which an initial point counts as hardly lower; "
+        "null for one standard error of the difference between the crops, where crops of several "
+        "lines tell it (docs/method/decisions.md)",
     )
     near_best: float = Field(
         0.0,
         ge=0,
         lt=1,
         description="middle: share of the initial points that are drawn around the best of the "
-        "others, which the whole range hides where few of them are good",
+        "others; for scores that are high in a small part of the range only",
     )
     searches: int = Field(4, ge=1, description="searches started; only the best continues")
     trial: int = Field(15, ge=0, description="generations after which the best search is chosen")

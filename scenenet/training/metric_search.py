@@ -137,10 +137,10 @@ def _middle(
         within = within_one_error(reached, np.array(without))
     else:
         within = reached >= reached.max() - search.hardly
-    good = [of for of, is_good in zip(numbers, within, strict=True) if is_good]
+    good = [each for each, counts in zip(numbers, within, strict=True) if counts]
     # Means of weights that sum to one sum to one, and means of bounded lengths stay in bounds.
     model.set_shape_parameters(
-        {name: float(np.mean([of[name] for of in good])) for name in good[0]}
+        {name: float(np.mean([each[name] for each in good])) for name in good[0]}
     )
     _, score = model.best_step(curve_of(model, crops, known))
     return _row(model, 1, score, kept, time.perf_counter() - started)

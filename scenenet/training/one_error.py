@@ -15,7 +15,7 @@ def left_out(curves: Sequence[ThresholdCurve], step: int, false_weight: float) -
 
     Args:
         curves: of each of the C crops.
-        step: number of the threshold.
+        step: number of the threshold in ``scenenet.metrics.threshold_curve.THRESHOLDS``.
         false_weight: how much a false voxel counts.
     """
     counts = np.array(

@@ -23,14 +23,15 @@ from scenenet.convolution.cross_section import (
 )
 from scenenet.convolution.occupancy import Occupancy
 from scenenet.core.errors import InputError
-from scenenet.geneo import Extent, Lattice, ShapeParameter
+from scenenet.geneo import Extent, ShapeParameter
 from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
+from scenenet.models import bounded_numbers
 from scenenet.models.evidence import Evidence
 from scenenet.models.geneo_model import GeneoModel, RespondsAt
 from scenenet.models.known_answers import KnownAnswers
+from scenenet.models.metric_kernels import KeptKernels, KernelGrid
 from scenenet.models.settings import (
-    LARGEST_KERNEL,
     LARGEST_LENGTH,
     THESIS_GENEOS,
     KernelSize,
@@ -38,20 +39,12 @@ from scenenet.models.settings import (
     Mixing,
 )
 
-COLUMN_M = 2.0
-"""Occupied length of a tower's axis, m, at which the observer H is 1. It only sets the scale of H:
-the twelve metres that the kernels reach then give at most 6, where float32 still resolves
-probabilities."""
 BEYOND_REACH_M = 1.0
 """m that a kernel reaches beyond the crossarms: a voxel of air."""
 CORNER_M = 0.5
 """m that a cross-section reaches beyond the corners of a body: half a voxel."""
 TINY = 1e-9
 """Smallest mixing weight that is stored; smaller ones are replaced by it."""
-MOST_KEPT = 512
-"""Sampled kernels that a model keeps."""
-LOGIT_END = 16.0
-"""Largest |logit|: float32 cannot distinguish a sigmoid beyond it from its bound."""
 
 Shapes = dict[str, dict[str, Tensor]]
 """The shape parameters of each GENEO by symbol, by the name of the GENEO."""
@@ -108,7 +101,7 @@ class MetricSceneNet(GeneoModel):
         self.metric = metric or MetricSettings()
         self.first = first
         self.evidence: dict[str, Evidence] = {}
-        self._sampled: dict[tuple[str, float], tuple[Hashable, Tensor]] = {}
+        self._kept = KeptKernels()
         self._decoded: dict[str, tuple[Hashable, dict[str, Tensor]]] = {}
         for label, value in self._own_fixed().items():
             name, symbol = label.rsplit(".", 1)
@@ -134,7 +127,7 @@ class MetricSceneNet(GeneoModel):
         return cls(geneos, metric, first=before, generator=generator)
 
     def _initial_shape(self, parameter: ShapeParameter, drawn: Tensor) -> Tensor:
-        return torch.logit(0.03 + 0.94 * drawn)
+        return bounded_numbers.initial(drawn)
 
     def _initial_mixing(self, drawn: Tensor) -> Tensor:
         return 6 * drawn - 3
@@ -224,20 +217,10 @@ class MetricSceneNet(GeneoModel):
 
     def _discretise(self, voxel_size: float) -> None:
         extents = self._extents(self._shapes()).values()
-        high = whole_voxels(max(max(e.up, e.down) for e in extents), voxel_size)
-        wide = 2 * whole_voxels(max(e.around for e in extents), voxel_size) + 1
-        # Centred on the voxel it responds at, so twice the longer side high; ``_sample`` sets the
-        # excess of the shorter side to zero.
-        size = (2 * high + 1, wide, wide)
-        if max(size) > LARGEST_KERNEL:
-            raise InputError(
-                f"its kernels would have {'x'.join(map(str, size))} voxels of {voxel_size:g} m, "
-                f"and a kernel has at most {LARGEST_KERNEL} voxels along an edge",
-                remedy="Sample them at the size of the blocks that the model observes "
-                "(observed_size)",
-            )
-        self.kernel_size = size
-        self.voxel_size = float(voxel_size)
+        seen = voxel_size if self.measured else 0.0
+        self._grid = KernelGrid.holding(extents, voxel_size, seen)
+        self.kernel_size = self._grid.size
+        self.voxel_size = self._grid.voxel_size
 
     def block_edge(self, voxel_size: float) -> int:
         return block_edge(voxel_size, self.metric.observed)
@@ -349,7 +332,7 @@ class MetricSceneNet(GeneoModel):
         stored = self._stored_shape(name)
         ranges = {p.name: self.bounds_of(p) for p in self.parameters_of(name)}
         return {
-            symbol: low * (high / low) ** torch.sigmoid(stored[symbol])
+            symbol: bounded_numbers.decoded(stored[symbol], low, high)
             for symbol, (low, high) in ranges.items()
         }
 
@@ -376,56 +359,24 @@ class MetricSceneNet(GeneoModel):
     def kernels(self) -> Tensor:
         shapes = self._shapes()
         extents = self._extents(shapes)
-        return torch.stack([self._along_x(name, shapes[name], extents[name]) for name in shapes])
+        along_x = [
+            self._kept.along_x(name, self.kernel_of(name), shape, extents[name], self._grid)
+            for name, shape in shapes.items()
+        ]
+        return torch.stack(along_x)
 
     def orbits(self) -> list[Tensor]:
         shapes = self._shapes()
         extents = self._extents(shapes)
-        return [self._sample(name, shapes[name], extents[name]) for name in self.names]
+        return [
+            self._grid.sample(self.kernel_of(name), shapes[name], extents[name])
+            for name in self.names
+        ]
 
     def orbit_of(self, name: str, azimuth: float = 0.0) -> Tensor:
         shapes = self._shapes()
-        return self._sample(name, shapes[name], self._extents(shapes)[name], azimuth)
-
-    def _along_x(self, name: str, shape: dict[str, Tensor], extent: Extent) -> Tensor:
-        """The kernel of a GENEO, or the one along x, (kz, ky, kx).
-
-        Without a gradient the last one is kept: whoever varies a number of one GENEO, or a weight,
-        asks for those of the others again.
-        """
-        if torch.is_grad_enabled():
-            return self._sample(name, shape, extent, along_x=True)[0]
-        made_from = (self.kernel_size, extent, *(float(number) for number in shape.values()))
-        kept, kernel = self._sampled.get((name, self.voxel_size), (None, None))
-        if kernel is None or kept != made_from:
-            kernel = self._sample(name, shape, extent, along_x=True)[0]
-            if len(self._sampled) >= MOST_KEPT:  # each crop may have voxels of its own size
-                self._sampled.clear()
-            self._sampled[name, self.voxel_size] = made_from, kernel
-        return kernel
-
-    def _sample(
-        self,
-        name: str,
-        shape: dict[str, Tensor],
-        extent: Extent,
-        azimuth: float = 0.0,
-        *,
-        along_x: bool = False,
-    ) -> Tensor:
-        """The kernels of the orbit of a GENEO, or only the one along x, (n, kz, ky, kx)."""
-        seen = self.voxel_size if self.measured else 0.0
-        up, down, around = extent
-        lattice = Lattice.of_extent(self.kernel_size, around, self.voxel_size, voxel=seen)
-        ends = (lattice.z >= -down * (1 + 1e-6)) & (lattice.z <= up * (1 + 1e-6))
-        assert lattice.inside is not None
-        kernel = self.kernel_of(name)
-        if along_x:
-            sampled = kernel.sample(lattice, shape)[None]
-        else:
-            sampled = kernel.orbit(lattice, shape, azimuth)
-        scale = self.voxel_size / COLUMN_M if kernel.adds_up_height else 1.0
-        return sampled * lattice.inside * ends * scale
+        extent = self._extents(shapes)[name]
+        return self._grid.sample(self.kernel_of(name), shapes[name], extent, azimuth)
 
     def unit_of(self, parameter: ShapeParameter) -> str:
         return parameter.metric_unit
@@ -467,8 +418,8 @@ class MetricSceneNet(GeneoModel):
 
     def _store(self, name: str, parameter: ShapeParameter, value: float) -> None:
         low, high = self.bounds_of(parameter)
-        share = math.log(value / low) / math.log(high / low)
-        self._stored_shape(name)[parameter.name].data.fill_(_logit(share))
+        stored = bounded_numbers.encoded(value, low, high)
+        self._stored_shape(name)[parameter.name].data.fill_(stored)
 
     def with_kernel_size(self, kernel_size: KernelSize) -> Self:
         raise InputError(
@@ -482,9 +433,3 @@ def _strongest_parts(parts: Tensor, section: Section) -> Tensor:
     the voxels of ``section.at``."""
     rows = strongest(parts.sum(dim=0).numpy(), section.starts, section.rows)
     return parts[:, torch.from_numpy(rows)]
-
-
-def _logit(share: float) -> float:
-    if share <= 0 or share >= 1:
-        return LOGIT_END if share >= 1 else -LOGIT_END
-    return max(-LOGIT_END, min(LOGIT_END, math.log(share / (1 - share))))

@@ -20,7 +20,8 @@ from scenenet.figures.selection import (
     thinned,
 )
 from scenenet.metrics.score_columns import score_text
-from scenenet.results.folder import Results, SeedResult
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import SeedResult
 
 if TYPE_CHECKING:
     from scenenet.evaluation.result import SampleScores

@@ -20,7 +20,8 @@ from scenenet.figures.selection import (
     thinned,
     voxel_classes,
 )
-from scenenet.results.folder import Results, read_result
+from scenenet.results.folder import Results
+from scenenet.results.result_files import read_result
 
 GRID_RESOLUTIONS = (32, 64, 128)
 

@@ -14,7 +14,8 @@ from scenenet.core.errors import InputError
 from scenenet.experiments.published import Thesis
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures.selection import champion_of
-from scenenet.results.folder import Results, parameter_columns
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import parameter_columns
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel

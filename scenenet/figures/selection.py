@@ -11,7 +11,9 @@ import numpy as np
 
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import ROLE_COLOURS
-from scenenet.results.folder import Results, SeedResult, read_table
+from scenenet.results.folder import Results
+from scenenet.results.result_files import read_table
+from scenenet.results.seed_result import SeedResult
 
 if TYPE_CHECKING:
     from scenenet.evaluation.result import SampleScores

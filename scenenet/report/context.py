@@ -19,7 +19,8 @@ from scenenet.experiments.published import Thesis
 from scenenet.figures import Picture, plan, read_pictures
 from scenenet.metrics.score_columns import PUBLISHED_SCORES, SCORE_COLUMNS, TRUTH
 from scenenet.report.blocks import Block, Column, Figure, Section
-from scenenet.results.folder import Results, read_table
+from scenenet.results.folder import Results
+from scenenet.results.result_files import read_table
 
 
 @dataclass(frozen=True)

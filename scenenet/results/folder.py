@@ -6,84 +6,23 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from scenenet.core.errors import InputError
-from scenenet.core.files import read_json
 from scenenet.detection.survey_tower import SurveyTower, read_towers
 from scenenet.evaluation.result import Evaluation
 from scenenet.interpretability.result import ModelCertificate
-from scenenet.metrics.voxel_scores import VoxelScores
 from scenenet.models.settings import BOOSTED_TREES
 from scenenet.pointcloud.quality.report import SurveyReport
 from scenenet.prediction.summary import PredictionSummary
 from scenenet.results.interactive_crop import InteractiveCrop
+from scenenet.results.result_files import read_result, read_table, read_typed
+from scenenet.results.seed_result import SeedResult
 from scenenet.training.tuning_result import Tuning
 
 if TYPE_CHECKING:
     from scenenet.experiments.studies.settings import StudySettings
-
-Typed = TypeVar("Typed")
-
-HISTORY_MEASURES = frozenset({"epoch", "loss", "fidelity", "penalty", "seconds", "learning_rate"})
-"""Columns of a training history that are not parameters of the model."""
-
-
-@dataclass(frozen=True)
-class SeedResult:
-    """One model trained from one seed, tuned and evaluated.
-
-    Attributes:
-        model: name of the model in the configuration.
-        kind: architecture: ``scenenet``, ``cnn`` or ``BOOSTED_TREES``.
-        seed: the seed it was trained from.
-        evaluation: scores on the test crops (``evaluate/MODEL/seed-N.json``).
-        tuning: tau and the scores on the validation crops; None before tuning.
-        history: one row per epoch; None if the model was not trained here.
-        provenance: record of settings, inputs and code of the training.
-        resources: memory and time of the training (``scenenet.core.peak_memory.used``).
-        model_files: files of the tuned model.
-    """
-
-    model: str
-    kind: str
-    seed: int
-    evaluation: Evaluation
-    tuning: Tuning | None = None
-    history: pd.DataFrame | None = None
-    provenance: Mapping[str, Any] | None = None
-    resources: Mapping[str, Any] | None = None
-    model_files: tuple[Path, ...] = ()
-
-    @property
-    def alive(self) -> bool:
-        """Whether the model is live: it detects a tower voxel (thesis 5.2.6: one CNN in five
-        is)."""
-        return self.evaluation.alive
-
-    @property
-    def validation(self) -> VoxelScores | None:
-        """Scores on the validation crops at tau; None before tuning."""
-        return None if self.tuning is None else self.tuning.validation
-
-    @property
-    def decisive(self) -> tuple[float, float]:
-        """What to choose by on the validation crops (``Tuning.decisive``); 0 before tuning."""
-        return (0.0, 0.0) if self.tuning is None else self.tuning.decisive
-
-    @property
-    def epochs(self) -> int | None:
-        """Epochs it was trained for."""
-        return None if self.history is None else len(self.history)
-
-    @property
-    def seconds(self) -> float | None:
-        """Training time, s."""
-        if self.history is None or "seconds" not in self.history:
-            return None
-        return float(self.history["seconds"].sum())
 
 
 @dataclass(frozen=True)
@@ -346,64 +285,3 @@ class Results:
     ) -> dict[str, Any]:
         paths = {survey: self.folder / stage / survey / name for survey in surveys}
         return {survey: read(path) for survey, path in paths.items() if path.exists()}
-
-
-def parameter_columns(history: pd.DataFrame) -> list[str]:
-    """Columns of a training history with parameters of the model, such as ``cylinder.r``."""
-    return [
-        name
-        for name in history.columns
-        if name not in HISTORY_MEASURES and not name.startswith(("train_", "validation_"))
-    ]
-
-
-def read_result(path: Path) -> Mapping[str, Any]:
-    """Read a JSON result.
-
-    Raises:
-        InputError: the file is missing or is not a JSON object.
-    """
-    try:
-        data = read_json(path)
-    except OSError as error:
-        raise _unreadable(path, error.strerror or "cannot be read") from None
-    except ValueError as error:
-        raise _unreadable(path, f"is not JSON ({error})") from None
-    if not isinstance(data, Mapping):
-        raise _unreadable(path, "is not a JSON object")
-    return data
-
-
-def read_typed(path: Path, make: Callable[[Mapping[str, Any]], Typed]) -> Typed:
-    """Read a JSON result as its type.
-
-    Args:
-        path: the file.
-        make: the ``from_json`` of the type.
-
-    Raises:
-        InputError: the file is missing, is not a JSON object, or was written by another version.
-    """
-    data = read_result(path)
-    try:
-        return make(data)
-    except (KeyError, TypeError) as error:
-        raise _unreadable(path, f"is a result of another version ({error})") from None
-
-
-def read_table(path: Path) -> pd.DataFrame:
-    """Read a CSV result.
-
-    Raises:
-        InputError: the file is missing or is not a table.
-    """
-    try:
-        return pd.read_csv(path)
-    except OSError as error:
-        raise _unreadable(path, error.strerror or "cannot be read") from None
-    except ValueError as error:
-        raise _unreadable(path, f"is not a table ({error})") from None
-
-
-def _unreadable(path: Path, problem: str) -> InputError:
-    return InputError(problem, file=path, remedy="Delete it and run the workflow again")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from pydantic import ValidationError
 
 from scenenet.models.settings import ModelSettings
-from scenenet.results.folder import SeedResult, parameter_columns
+from scenenet.results.seed_result import SeedResult, parameter_columns
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel

@@ -12,7 +12,8 @@ from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, read_json, sha256, write_text
 from scenenet.evaluation.result import PointScores, Scores, TowerScores
 from scenenet.metrics.score_columns import score_text
-from scenenet.results.folder import Results, SeedResult
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import SeedResult
 
 TEXT = """\
 # The model `{name}`

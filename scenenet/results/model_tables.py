@@ -15,7 +15,8 @@ import pandas as pd
 from scenenet.experiments.published import Thesis
 from scenenet.interpretability.determination import determination
 from scenenet.interpretability.parameter_sentences import Parameter, parameters_of, sentences
-from scenenet.results.folder import BOOSTED_TREES, Results
+from scenenet.models.settings import BOOSTED_TREES
+from scenenet.results.folder import Results
 from scenenet.results.initial_models import initial_model
 
 if TYPE_CHECKING:

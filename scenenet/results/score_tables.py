@@ -23,7 +23,9 @@ from scenenet.metrics.score_columns import (
     TRUTH,
     WHOLE_TOWERS,
 )
-from scenenet.results.folder import BOOSTED_TREES, Results, SeedResult
+from scenenet.models.settings import BOOSTED_TREES
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import SeedResult
 
 TRIVIAL = "nothing detected"
 """Name of the trivial baseline, a model that never predicts tower."""

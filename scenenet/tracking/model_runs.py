@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from scenenet.core.files import digest
 from scenenet.metrics.score_columns import DECISIVE_FIRST, MATCH_SCORES, POINT_SCORES, SCORES
-from scenenet.results.folder import BOOSTED_TREES, Results, SeedResult
+from scenenet.models.settings import BOOSTED_TREES
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import SeedResult
 from scenenet.tracking.logged_model import ModelRecord
 from scenenet.tracking.run_log import NOTE_TAG, DatasetRecord, RunGroup, RunRecord
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from scenenet.core import files
 from scenenet.core.errors import InputError
 from scenenet.metrics.score_columns import score_text
-from scenenet.results.folder import Results, SeedResult
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import SeedResult
 from scenenet.tracking.database import exclusive, require_schema
 from scenenet.tracking.logged_model import model_ids
 from scenenet.tracking.store import (

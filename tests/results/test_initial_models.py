@@ -11,8 +11,8 @@ from scenenet.models.factory import new_model
 from scenenet.models.geneo_model import GeneoModel
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.settings import MetricSettings, ModelSettings, TrainingSettings
-from scenenet.results.folder import SeedResult
 from scenenet.results.initial_models import DRAWN, FIRST_STEP, initial_model
+from scenenet.results.seed_result import SeedResult
 from scenenet.training.train import fit
 
 

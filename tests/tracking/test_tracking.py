@@ -26,7 +26,9 @@ from scenenet.experiments.studies.run import COLUMNS
 from scenenet.experiments.studies.settings import StudySettings
 from scenenet.figures import draw_all, plan
 from scenenet.models.model_file import read_model
-from scenenet.results.folder import BOOSTED_TREES, Results, parameter_columns
+from scenenet.models.settings import BOOSTED_TREES
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import parameter_columns
 from scenenet.tracking.logged_model import example
 from scenenet.tracking.model_runs import model_groups
 from scenenet.tracking.registry import register_champions

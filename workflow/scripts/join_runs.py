@@ -7,7 +7,7 @@ def join_runs(job: _job.Job) -> None:
     import pandas as pd
 
     from scenenet.core.files import atomic
-    from scenenet.results.folder import read_table
+    from scenenet.results.result_files import read_table
 
     for name in ("runs", "times"):
         tables = [read_table(path) for path in getattr(job.input, name)]

@@ -8,7 +8,7 @@ def track_experiment(job: _job.Job) -> None:
 
     from scenenet.experiments.run_tables import with_times
     from scenenet.figures import read_pictures
-    from scenenet.results.folder import read_result, read_table
+    from scenenet.results.result_files import read_result, read_table
     from scenenet.tracking.experiment_runs import EXPERIMENT_GROUPS, experiment_note, origin_of
     from scenenet.tracking.run_log import log_runs
     from scenenet.tracking.store import TrackingSettings, experiment_of

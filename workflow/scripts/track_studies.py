@@ -9,7 +9,7 @@ def track_studies(job: _job.Job) -> None:
     from scenenet.experiments.run_tables import with_times
     from scenenet.experiments.studies.settings import StudySettings
     from scenenet.figures import read_pictures
-    from scenenet.results.folder import read_result, read_table
+    from scenenet.results.result_files import read_result, read_table
     from scenenet.tracking.run_log import log_runs
     from scenenet.tracking.store import TrackingSettings, experiment_of
     from scenenet.tracking.study_runs import note_of, study_groups

@@ -14,9 +14,9 @@ from scenenet.metrics.score_columns import (
     WHOLE_TOWERS,
     score_text,
 )
+from scenenet.models.settings import BOOSTED_TREES
 from scenenet.report.blocks import Block, Facts, Section, Text, write
 from scenenet.report.context import Against, ReportContext, against
-from scenenet.results.folder import BOOSTED_TREES
 from scenenet.results.score_tables import TRIVIAL
 
 SAME = 0.02

@@ -14,7 +14,8 @@ from scenenet.experiments.studies.summary import summarise
 from scenenet.metrics.score_columns import SCORES, TRUTH
 from scenenet.results import score_tables
 from scenenet.results.claims.intervals import mean
-from scenenet.results.folder import Results, SeedResult
+from scenenet.results.folder import Results
+from scenenet.results.seed_result import SeedResult
 
 EVERYTHING_MARKED = 0.1
 """F0.5 of marking every occupied voxel, if a run has not counted its voxels; tower voxels are about

@@ -15,7 +15,8 @@ from pydantic_core import PydanticUndefined
 from scenenet.clearance.settings import ClearanceLimits
 from scenenet.config.errors import model_in
 from scenenet.config.observers import ObserverSettings
-from scenenet.config.schema import Config, SyntheticSurvey
+from scenenet.config.schema import Config
+from scenenet.config.survey_settings import SyntheticSurvey
 from scenenet.config.survey_sheet import SurveyRow
 from scenenet.core.files import write_json, write_text
 from scenenet.models.settings import ModelSettings

@@ -16,11 +16,12 @@ from pydantic import Field, ValidationError, model_validator
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.config.errors import explain
 from scenenet.config.observers import ObserverSettings, predicting
+from scenenet.config.survey_settings import NewSurveys, Synthetic
 from scenenet.config.written import geneos_in, merged, with_values
 from scenenet.core.errors import InputError, in_file
 from scenenet.core.provenance import FULL_BELOW_BYTES
 from scenenet.core.provided_code import KERNELS
-from scenenet.core.settings import NAME, PathText, Settings
+from scenenet.core.settings import PathText, Settings
 from scenenet.dataset.crops import CropSettings
 from scenenet.dataset.labelled_towers import TowerSettings
 from scenenet.dataset.split import SplitSettings
@@ -47,46 +48,6 @@ from scenenet.synthetic.settings import SyntheticSettings
 from scenenet.tracking.store import TrackingSettings
 
 Seed = Annotated[int, Field(ge=0)]
-
-
-class NewSurveys(Settings):
-    """The inbox: surveys that are only classified and need no row in the survey sheet."""
-
-    folder: PathText | None = Field(
-        "surveys", description="folder whose LAS and LAZ files are classified; null for no inbox"
-    )
-    codes: Codes = Field("asprs", description="class scheme of these files, if they have labels")
-    reviews: PathText | None = Field(
-        "reviews",
-        description="folder with what people decided about the towers of new surveys: SURVEY.csv "
-        "or SURVEY.gpkg, or several files SURVEY.anything.csv; null for none",
-    )
-
-
-class SyntheticSurvey(SyntheticSettings):
-    """A synthetic survey, made as RESULTS_DIR/synthetic/NAME.laz; .las if it is temporary."""
-
-    name: str = Field(pattern=NAME, description="name of its file")
-
-
-class Synthetic(Settings):
-    """Synthetic surveys that the workflow can make; the survey sheet says which are used."""
-
-    surveys: tuple[SyntheticSurvey, ...] = Field(
-        (), description="synthetic surveys that the workflow can make"
-    )
-    temporary: bool = Field(
-        False,
-        description="delete the files of the synthetic surveys once their crops are cut; they are "
-        "made again when a stage has to read them. They are .las files, which are eight times as "
-        "large as .laz and read in a third of the time",
-    )
-
-    @property
-    def suffix(self) -> str:
-        """Suffix of the files. One that is soon deleted is not worth compressing: it would be
-        compressed twice, with its truth, and decompressed five times."""
-        return ".las" if self.temporary else ".laz"
 
 
 class Prediction(PredictSettings):

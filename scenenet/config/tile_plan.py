@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from scenenet.config.survey_sheet import REPEATED, REPEATS, Survey
+from scenenet.config.survey import REPEATED, REPEATS, Survey
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json, write_json
 from scenenet.core.provenance import fingerprint

@@ -7,8 +7,9 @@ from typing import get_args
 
 import pytest
 
+from scenenet.config.read_surveys import read_surveys
 from scenenet.config.schema import load
-from scenenet.config.survey_sheet import Survey, file_name, read_surveys
+from scenenet.config.survey import Survey, file_name
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.class_schemes import SCHEMES, Codes
 

@@ -9,7 +9,7 @@ import pyproj
 import pytest
 
 from scenenet.config import tile_plan
-from scenenet.config.survey_sheet import Survey
+from scenenet.config.survey import Survey
 from scenenet.config.tile_plan import NEIGHBOURS_M, UNREADABLE, HeaderCache, plan_tiles
 from scenenet.core.provenance import fingerprint
 from scenenet.pointcloud import PointCloud, write_las

@@ -22,7 +22,7 @@ from scenenet.figures import CROP_RANKS
 from scenenet.core.files import digest
 from scenenet.core.provenance import fingerprint
 from scenenet.results.tables import print_scores
-from scenenet.config.survey_sheet import read_surveys
+from scenenet.config.read_surveys import read_surveys
 from scenenet.config.tile_plan import NEIGHBOURS_M, HeaderCache, plan_tiles
 
 WORKFLOW = Path(workflow.current_basedir).parent

@@ -24,56 +24,62 @@ EXAMPLES = (
 )
 
 
+Decisions = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--decisions",
+        metavar="FILE",
+        help="Review file: CSV, or a GeoPackage with a layer review. May be repeated.",
+    ),
+]
+Template = Annotated[
+    Path | None,
+    typer.Option(
+        "--template",
+        metavar="FILE",
+        help="Write a review file to fill in (.csv, .gpkg), the doubtful towers first.",
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", help="Folder for the reviewed list.  [default: the folder of the list]"),
+]
+Labels = Annotated[
+    Path | None,
+    typer.Option(
+        "--labels",
+        metavar="OUT",
+        help="Survey to write with the review as labels, for train and evaluate: a .laz file, "
+        "or a folder for a survey of several files. Needs --codes.",
+    ),
+]
+LabelScheme = Annotated[
+    Codes | None,
+    typer.Option("--codes", help=f"Class scheme of the labels ({difference()})."),
+]
+AcceptRest = Annotated[
+    bool,
+    typer.Option("--accept-rest", help="With --labels: label towers without a decision too."),
+]
+System = Annotated[
+    str | None,
+    typer.Option(
+        "--crs",
+        metavar="SYSTEM",
+        help="Coordinate system of review files that state none.  [default: that of the survey]",
+    ),
+]
+
+
 def command(
     found: FoundTowers,
-    decisions: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--decisions",
-            metavar="FILE",
-            help="Review file: CSV, or a GeoPackage with a layer review. May be repeated.",
-        ),
-    ] = None,
-    template: Annotated[
-        Path | None,
-        typer.Option(
-            "--template",
-            metavar="FILE",
-            help="Write a review file to fill in (.csv, .gpkg), the doubtful towers first.",
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", help="Folder for the reviewed list.  [default: the folder of the list]"
-        ),
-    ] = None,
-    labels: Annotated[
-        Path | None,
-        typer.Option(
-            "--labels",
-            metavar="OUT",
-            help="Survey to write with the review as labels, for train and evaluate: a .laz file, "
-            "or a folder for a survey of several files. Needs --codes.",
-        ),
-    ] = None,
-    codes: Annotated[
-        Codes | None,
-        typer.Option("--codes", help=f"Class scheme of the labels ({difference()})."),
-    ] = None,
-    accept_rest: Annotated[
-        bool,
-        typer.Option("--accept-rest", help="With --labels: label towers without a decision too."),
-    ] = False,
-    crs: Annotated[
-        str | None,
-        typer.Option(
-            "--crs",
-            metavar="SYSTEM",
-            help="Coordinate system of review files that state none.  [default: that of the "
-            "survey]",
-        ),
-    ] = None,
+    decisions: Decisions = None,
+    template: Template = None,
+    out: Out = None,
+    labels: Labels = None,
+    codes: LabelScheme = None,
+    accept_rest: AcceptRest = False,
+    crs: System = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:

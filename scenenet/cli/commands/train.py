@@ -27,11 +27,11 @@ from scenenet.cli.options import (
 from scenenet.cli.output import show, training_lines
 from scenenet.core.provided_code import MEASUREMENTS
 from scenenet.dataset.square_settings import SquareSettings
-from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL
+from scenenet.dataset.voxels import LARGEST_VOXEL, SMALLEST_VOXEL, VoxelSettings
 from scenenet.measurement.registry import PRESENCE
 from scenenet.models import settings
-from scenenet.models.settings import LARGEST_RATE, THESIS_GENEOS
-from scenenet.pointcloud.targets import ROLES, TOWER
+from scenenet.models.settings import LARGEST_RATE, THESIS_GENEOS, ModelSettings
+from scenenet.pointcloud.targets import ROLES, TOWER, Target
 from scenenet.training import presets
 
 EXAMPLES = (
@@ -186,9 +186,57 @@ def command(
     if mixing.value != "convex" and not presets.is_searched(kind.value, protocol.value):
         raise typer.BadParameter("only for an operational SCENE-Net", param_hint="--mixing")
     finds = target_of(target)
+    chosen = _model_settings(
+        kind, protocol, epochs, learning_rate, geneos, finds, measurement, mixing
+    )
+    # After the options, so that a wrong one is named at once.
+    from scenenet.cli.trained_files import train_files
+    from scenenet.core.files import digest
+    from scenenet.core.outputs import Output, check_outputs
+    from scenenet.core.provenance import package_version
+    from scenenet.detection.settings import DetectionSettings
+    from scenenet.models.model_file import is_model_file
+
+    if validation is None:
+        validation = presets.validation_share(kind.value, protocol.value)
+    check_outputs([Output(out, is_model_file)], labelled, overwrite=overwrite)
+    failures = Failures()
+    result = train_files(
+        labelled,
+        codes.value,
+        _grid(kind, protocol, finds, resolution, voxel_size),
+        chosen,
+        presets.TUNING,
+        range(seeds),
+        validation,
+        DetectionSettings(),
+        {
+            "config": digest(chosen.model_dump()),
+            "version": package_version(),
+        },
+        out,
+        failures,
+        SquareSettings(edge=square),
+    )
+    show(result, as_json, training_lines)
+    failures.end()
+
+
+def _model_settings(
+    kind: Kinds,
+    protocol: Protocols,
+    epochs: int | None,
+    learning_rate: float | None,
+    geneos: str | None,
+    finds: Target,
+    measurement: str,
+    mixing: Mixings,
+) -> ModelSettings:
+    """The settings of the model to train; a setting that it cannot have is an error of its
+    option."""
     try:
         names = None if geneos is None else [name.strip() for name in geneos.split(",")]
-        chosen = presets.preset(
+        return presets.preset(
             kind.value,
             protocol.value,
             epochs,
@@ -206,38 +254,18 @@ def command(
     except ValueError as error:
         option = "--epochs" if learning_rate is None else "--learning-rate"
         raise typer.BadParameter(f"{error} (use --protocol thesis)", param_hint=option) from None
-    # After the options, so that a wrong one is named at once.
-    from scenenet.cli.trained_files import train_files
-    from scenenet.core.files import digest
-    from scenenet.core.outputs import Output, check_outputs
-    from scenenet.core.provenance import package_version
-    from scenenet.detection.settings import DetectionSettings
-    from scenenet.models.model_file import is_model_file
 
+
+def _grid(
+    kind: Kinds,
+    protocol: Protocols,
+    finds: Target,
+    resolution: int | None,
+    voxel_size: float | None,
+) -> VoxelSettings:
+    """The grid of the crops: that of the options, or else the usual one of the model."""
     if voxel_size is None and resolution is None:
         voxel_size = presets.voxel_size(kind.value, protocol.value, finds)
-    edges = RESOLUTION if resolution is None else resolution
-    grid = cube(edges) if voxel_size is None else metric(voxel_size)
-    if validation is None:
-        validation = presets.validation_share(kind.value, protocol.value)
-    check_outputs([Output(out, is_model_file)], labelled, overwrite=overwrite)
-    failures = Failures()
-    result = train_files(
-        labelled,
-        codes.value,
-        grid,
-        chosen,
-        presets.TUNING,
-        range(seeds),
-        validation,
-        DetectionSettings(),
-        {
-            "config": digest(chosen.model_dump()),
-            "version": package_version(),
-        },
-        out,
-        failures,
-        SquareSettings(edge=square),
-    )
-    show(result, as_json, training_lines)
-    failures.end()
+    if voxel_size is not None:
+        return metric(voxel_size)
+    return cube(RESOLUTION if resolution is None else resolution)

@@ -79,28 +79,7 @@ def compare(
     plants = _standing(corridor, cloud)
     plan, space = cKDTree(plants[:, :2]), cKDTree(plants)
     hanging = [c for c in corridor.conductors if c.from_tower and c.to_tower]
-    nearest = {
-        (place.span_id, place.conductor_id): place.distance
-        for place in found.places
-        if place.what == "nearest" and place.kind == VEGETATION
-    }
-    errors, unseen = [], 0
-    apart = np.full(len(plants), np.inf)
-    held = [c for c in line.conductors if c.kind != "cable"]
-    for true in hanging:
-        rows = _beside(true, plan, settings.reach)
-        if not len(rows):
-            continue
-        distance = nearest_on(true.catenary, plants[rows]).distance
-        apart[rows] = np.minimum(apart[rows], distance)
-        own = true_one(true, held)
-        if own is None or distance.min() > settings.reach:
-            continue
-        seen = nearest.get((own.span_id, own.conductor_id))
-        if seen is None:
-            unseen += 1
-        else:
-            errors.append(abs(seen - float(distance.min())))
+    apart, errors, unseen = _vegetation(hanging, plants, plan, line, found, settings.reach)
     danger = plants[apart < limits.vegetation]
     joined = places(danger, np.zeros(len(danger), int))
     true_places = [rows for rows in joined if len(rows) >= settings.few_points]
@@ -114,11 +93,55 @@ def compare(
     )
     trees, trees_missed, trees_false = _trees(corridor, hanging, found, settings)
     return Comparison(
-        kind=kind, vegetation=np.array(errors), unseen=unseen, danger_points=len(danger),
+        kind=kind, vegetation=errors, unseen=unseen, danger_points=len(danger),
         places=len(true_places), missed=missed,
         false=int(np.sum(space.query(at)[0][many] > SAME_POINT_M)) if len(at) else 0,
         trees=trees, trees_missed=trees_missed, trees_false=trees_false,
     )  # fmt: skip
+
+
+def _vegetation(
+    hanging: list[TrueConductor],
+    plants: np.ndarray,
+    plan: cKDTree,
+    line: SurveyLine,
+    found: SurveyClearances,
+    reach: float,
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Distances of plants (P, 3) and true conductors.
+
+    Args:
+        plan: the plants in plan.
+        reach: m, of the clearances.
+
+    Returns:
+        (P,) m, distance of each plant from the nearest conductor, inf where none is near;
+        (n,) m, error of the smallest distance of each conductor, where that was found; the number
+        of conductors for which it was not found.
+    """
+    nearest = {
+        (place.span_id, place.conductor_id): place.distance
+        for place in found.places
+        if place.what == "nearest" and place.kind == VEGETATION
+    }
+    errors, unseen = [], 0
+    apart = np.full(len(plants), np.inf)
+    held = [c for c in line.conductors if c.kind != "cable"]
+    for true in hanging:
+        rows = _beside(true, plan, reach)
+        if not len(rows):
+            continue
+        distance = nearest_on(true.catenary, plants[rows]).distance
+        apart[rows] = np.minimum(apart[rows], distance)
+        own = true_one(true, held)
+        if own is None or distance.min() > reach:
+            continue
+        seen = nearest.get((own.span_id, own.conductor_id))
+        if seen is None:
+            unseen += 1
+        else:
+            errors.append(abs(seen - float(distance.min())))
+    return apart, np.array(errors), unseen
 
 
 def _shown(found: SurveyClearances, limit: float) -> np.ndarray:

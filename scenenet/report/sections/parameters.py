@@ -2,8 +2,27 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from scenenet.report.blocks import Block, Column, Facts, Heading, Section, Text, table
 from scenenet.report.context import ReportContext
+
+COLUMNS = [
+    Column("parameter", "parameter"),
+    Column("symbol", "symbol"),
+    Column("mean", "trained", "number", "std"),
+    Column("unit", "unit"),
+    Column("initial", "initial", "number"),
+    Column("thesis", "thesis", "number", published=True),
+]
+EVIDENCE = [
+    Column("source", "comes from"),
+    Column("low", "lowest", "number"),
+    Column("high", "highest", "number"),
+    Column("bound_met", "seeds at a bound", "score"),
+    Column("determined", "determined", "yes"),
+]
+MEANING = Column("sentence", "meaning", "sentence")
 
 
 def learned(context: ReportContext) -> Section | None:
@@ -17,61 +36,51 @@ def _numbers(context: ReportContext) -> list[Block]:
     frame = context.table("parameters")
     if frame is None:
         return []
-    blocks: list[Block] = []
-    share = context.thesis.value("parameters.lambda_negative_sphere")
-    ours = frame[frame["parameter"] == "lambda.negative_sphere"]
-    if share is not None and len(ours):
-        facts = [("mixing weight of the negative sphere, thesis", f"{share:g} %")]
-        facts += [
-            (f"the same, {row.model}", f"{100 * row.mean:.1f} %") for row in ours.itertuples()
-        ]
-        blocks += [
-            Facts(facts),
-            Text(
-                "In the model of the thesis, the negative sphere has the largest mixing weight "
-                "(5.2.2). The weights of two runs can be compared only if the values of their "
-                "kernels are of similar size."
-            ),
-        ]
-    columns = [
-        Column("parameter", "parameter"),
-        Column("symbol", "symbol"),
-        Column("mean", "trained", "number", "std"),
-        Column("unit", "unit"),
-        Column("initial", "initial", "number"),
-        Column("thesis", "thesis", "number", published=True),
-        Column("sentence", "meaning", "sentence"),
-    ]
-    evidence = [
-        Column("source", "comes from"),
-        Column("low", "lowest", "number"),
-        Column("high", "highest", "number"),
-        Column("bound_met", "seeds at a bound", "score"),
-        Column("determined", "determined", "yes"),
-    ]
     shown = frame.assign(
         parameter=frame["parameter"].str.replace("_", " ").str.replace(".", ": "),
         unit=frame["unit"].map({"m": "m", "m^2": "m²", "1": "none"}),
     )
-    for model, rows in shown.groupby("model", sort=False):
-        seeds = int(rows["n_seeds"].iloc[0])
-        began = rows["initial_from"].iloc[0]
-        start = f" “Initial” is the mean of the values {began}." if began == began else ""
-        caption = (
-            f"Parameters of {model}, mean ± standard deviation over {seeds} seeds, lengths in "
-            "metres. The sentences are derived from the formulas of the kernels (thesis 4.4) with "
-            f"the mean values.{start}"
+    tables = [_of_model(str(model), rows) for model, rows in shown.groupby("model", sort=False)]
+    return [*_mixing_weights(context, frame), *tables]
+
+
+def _mixing_weights(context: ReportContext, frame: pd.DataFrame) -> list[Block]:
+    """The mixing weight of the negative sphere, beside that of the thesis."""
+    share = context.thesis.value("parameters.lambda_negative_sphere")
+    ours = frame[frame["parameter"] == "lambda.negative_sphere"]
+    if share is None or not len(ours):
+        return []
+    facts = [("mixing weight of the negative sphere, thesis", f"{share:g} %")]
+    facts += [(f"the same, {row.model}", f"{100 * row.mean:.1f} %") for row in ours.itertuples()]
+    return [
+        Facts(facts),
+        Text(
+            "In the model of the thesis, the negative sphere has the largest mixing weight "
+            "(5.2.2). The weights of two runs can be compared only if the values of their kernels "
+            "are of similar size."
+        ),
+    ]
+
+
+def _of_model(model: str, rows: pd.DataFrame) -> Block:
+    """The parameters of a model, with what the training data say about each if that is known."""
+    seeds = int(rows["n_seeds"].iloc[0])
+    began = rows["initial_from"].iloc[0]
+    start = f" “Initial” is the mean of the values {began}." if began == began else ""
+    caption = (
+        f"Parameters of {model}, mean ± standard deviation over {seeds} seeds, lengths in "
+        "metres. The sentences are derived from the formulas of the kernels (thesis 4.4) with "
+        f"the mean values.{start}"
+    )
+    with_evidence = rows["source"].notna().any()
+    if with_evidence:
+        caption += (
+            " “Lowest” and “highest” are the values that the training data allow: two standard "
+            "errors around a measurement in points, or F0.5 within 0.01 of the best with the "
+            "other numbers kept. Numbers that the data do not determine have no sentence."
         )
-        with_evidence = rows["source"].notna().any()
-        if with_evidence:
-            caption += (
-                " “Lowest” and “highest” are the values that the training data allow: two standard "
-                "errors around a measurement in points, or F0.5 within 0.01 of the best with the "
-                "other numbers kept. Numbers that the data do not determine have no sentence."
-            )
-        listed = columns[:-1] + evidence + columns[-1:] if with_evidence else columns
-        blocks.append(table(rows, listed, caption, "tables/parameters.csv"))
-    return blocks
+    listed = [*COLUMNS, *(EVIDENCE if with_evidence else []), MEANING]
+    return table(rows, listed, caption, "tables/parameters.csv")
 
 
 def certificate(context: ReportContext) -> Section | None:

@@ -171,8 +171,20 @@ def lattice() -> type[Lattice]:
     return Lattice
 
 
+@pytest.fixture
+def nothing_provided(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """No kernels and measurements from outside the package but those that the test provides."""
+    from scenenet.core.provided_code import KERNELS, MEASUREMENTS, _provided
+
+    for kind in (KERNELS, MEASUREMENTS):
+        monkeypatch.setenv(kind.variable, "")
+    _provided.cache_clear()
+    yield
+    _provided.cache_clear()
+
+
 @dataclass(frozen=True)
-class Chain:
+class DatasetFiles:
     """The files of a survey before training: paths of the survey, manifests and split."""
 
     survey: Path
@@ -182,7 +194,7 @@ class Chain:
 
 
 @pytest.fixture(scope="session")
-def chain(scene, tmp_path_factory: pytest.TempPathFactory) -> Chain:
+def dataset_files(scene, tmp_path_factory: pytest.TempPathFactory) -> DatasetFiles:
     """A survey of six poles 60 m apart, cut, voxelised at 1 m and split 2 / 1 / 3."""
     import pandas as pd
 
@@ -192,8 +204,8 @@ def chain(scene, tmp_path_factory: pytest.TempPathFactory) -> Chain:
     from scenenet.dataset.voxels import VoxelSettings
     from scenenet.pointcloud import write_las
 
-    folder = tmp_path_factory.mktemp("chain")
-    files = Chain(*(folder / n for n in ("s.laz", "crops.json", "voxels.json", "split.csv")))
+    folder = tmp_path_factory.mktemp("dataset")
+    files = DatasetFiles(*(folder / n for n in ("s.laz", "crops.json", "voxels.json", "split.csv")))
     poles = [(20.5 + 60 * i, 20.5) for i in range(6)]
     write_las(files.survey, scene(poles, size=(345.0, 40.0), tree=(30.0, 30.0)))
     towers = survey_towers(files.survey, "edp", TowerSettings(min_points=100)).towers

@@ -23,7 +23,7 @@ def wire_model(tmp_path_factory, pole_finder):
     return path
 
 
-def said(done) -> str:
+def message_of(done) -> str:
     return " ".join(done.err.replace("│", " ").split())
 
 
@@ -48,7 +48,7 @@ def test_limits_that_cannot_be_used_stop_the_command(
     named = [str(tmp_path / o) if o.endswith(".csv") else o for o in options]
     done = call("predict", pole_survey, "--model", pole_model, "--out", tmp_path / "out", *named)
     assert done.code == code
-    assert problem in said(done)
+    assert problem in message_of(done)
     assert not (tmp_path / "out").exists()
 
 
@@ -98,4 +98,4 @@ def test_line_adds_the_model_of_wires_of_the_package_unless_one_is_named(
 def test_a_model_of_the_package_has_a_name_and_lines_need_towers(call, pole_survey, tmp_path):
     done = call("predict", pole_survey, "--line", "--model", "wires", "--out", tmp_path / "out")
     assert done.code == 2
-    assert "needs a model of towers" in said(done)
+    assert "needs a model of towers" in message_of(done)

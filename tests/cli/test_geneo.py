@@ -9,17 +9,11 @@ import sys
 import pytest
 from fixtures.scenes import make_pole_finder
 
-from scenenet.core.provided_code import KERNELS, _provided
+from scenenet.core.provided_code import KERNELS
 from scenenet.models.model_file import write_model
 from scenenet.models.scenenet import SceneNet
 
-
-@pytest.fixture(autouse=True)
-def nothing_provided(monkeypatch):
-    """Each test provides its own kernels."""
-    monkeypatch.setenv(KERNELS.variable, "")
-    yield
-    _provided.cache_clear()
+pytestmark = pytest.mark.usefixtures("nothing_provided")
 
 
 def test_the_list_has_every_kernel_with_its_parameters_and_its_origin(call, tmp_path):

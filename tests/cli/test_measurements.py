@@ -9,17 +9,11 @@ import numpy as np
 import pytest
 from fixtures.measurement_file import BRIGHT
 
-from scenenet.core.provided_code import MEASUREMENTS, _provided
+from scenenet.core.provided_code import MEASUREMENTS
+
+pytestmark = pytest.mark.usefixtures("nothing_provided")
 
 SIGN, POST = 14, 6
-
-
-@pytest.fixture(autouse=True)
-def nothing_provided(monkeypatch):
-    monkeypatch.setenv(MEASUREMENTS.variable, "")
-    _provided.cache_clear()
-    yield
-    _provided.cache_clear()
 
 
 def street(path, seed, bright=60_000):

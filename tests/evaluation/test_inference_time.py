@@ -35,18 +35,18 @@ def model(pole_finder, tmp_path):
     return path
 
 
-def test_a_model_is_timed_on_both_grids(chain, model):
-    found = time_model(model, [chain.crops], chain.split)
+def test_a_model_is_timed_on_both_grids(dataset_files, model):
+    found = time_model(model, [dataset_files.crops], dataset_files.split)
     assert list(found["inference_ms"]) == [str(n) for n in RESOLUTIONS]
     assert all(ms > 0 for ms in found["inference_ms"].values())
     assert found["crops"] == 3
 
 
-def test_without_test_crops_there_is_nothing_to_time(chain, model, tmp_path):
+def test_without_test_crops_there_is_nothing_to_time(dataset_files, model, tmp_path):
     split = tmp_path / "split.csv"
     split.write_text("survey,crop,stretch,part\n")
     with pytest.raises(InputError, match="no crop is in the test part"):
-        time_model(model, [chain.crops], split)
+        time_model(model, [dataset_files.crops], split)
 
 
 def test_memory_that_is_taken_raises_the_peak():

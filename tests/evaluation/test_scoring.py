@@ -33,15 +33,15 @@ GRID = VoxelGrid((0.0, 0.0, 0.0), 1.0, SHAPE)
 LONE_POLES = DetectionSettings(min_conductor=0)
 """For scenes with poles without conductors."""
 CARD = ModelCard(
-    name="mock", codes="edp", measurement="presence", fit="metric", resolution=64, voxel_size=1.0,
+    name="given", codes="edp", measurement="presence", fit="metric", resolution=64, voxel_size=1.0,
     tau=0.5, provenance={"seed": 4},
 )  # fmt: skip
 
 
-class Mock(VoxelModel):
-    """Predicts given probabilities for every crop."""
+class Given(VoxelModel):
+    """A model that predicts given probabilities for every crop."""
 
-    kind = "mock"
+    kind = "given"
     kernel_size = (1, 1, 1)
 
     def __init__(self, *probabilities: dict[tuple[int, int, int], float]) -> None:
@@ -89,7 +89,7 @@ def towers_at(*xs: int):
     return lambda sample: Answer(PointCounts(), np.array(voxels, np.int64), places)
 
 
-def scores(model: Mock, *crops, tau: float = 0.5, answer=nothing):
+def scores(model: Given, *crops, tau: float = 0.5, answer=nothing):
     samples, of_samples = zip(*crops, strict=True)
     dataset = Dataset(list(samples), list(of_samples), "edp", [])
     return score(model, CARD.with_tau(tau), dataset, answer)
@@ -97,7 +97,7 @@ def scores(model: Mock, *crops, tau: float = 0.5, answer=nothing):
 
 def test_a_perfect_model_scores_one():
     result = scores(
-        Mock(pole(5), pole(15)), crop(1, 5), crop(2, 15),
+        Given(pole(5), pole(15)), crop(1, 5), crop(2, 15),
         answer=lambda sample: towers_at({"crop-1": 5, "crop-2": 15}[sample.id])(sample),
     )  # fmt: skip
     for name in ("precision", "recall", "f05", "iou_tower", "miou"):
@@ -108,14 +108,14 @@ def test_a_perfect_model_scores_one():
     }  # fmt: skip
     assert result.average_precision == 1.0
     assert result.alive is True
-    assert (result.model, result.seed) == ("mock", 4)
+    assert (result.model, result.seed) == ("given", 4)
     assert result.voxel.n_samples == 2
     assert result.voxel.tau == 0.5
 
 
 def test_scores_follow_from_the_counts_of_all_crops():
     # crop 1: 12 of 12 tower voxels; crop 2: 12 false ones, 12 missed
-    result = scores(Mock(pole(5), pole(25)), crop(1, 5), crop(2, 15))
+    result = scores(Given(pole(5), pole(25)), crop(1, 5), crop(2, 15))
     assert result.voxel.precision == 0.5
     assert result.voxel.recall == 0.5
     assert result.voxel.iou_tower == pytest.approx(12 / 36)
@@ -126,7 +126,7 @@ def test_scores_follow_from_the_counts_of_all_crops():
 
 
 def test_a_model_without_detections_scores_like_the_trivial_one():
-    result = scores(Mock({}), crop(1, 5))
+    result = scores(Given({}), crop(1, 5))
     assert result.voxel == result.voxel_trivial
     assert result.voxel.miou == pytest.approx(0.5, abs=0.01)
     assert result.voxel.iou_tower == 0.0
@@ -137,18 +137,18 @@ def test_a_model_without_detections_scores_like_the_trivial_one():
 
 def test_empty_voxels_count_except_in_the_occupied_scores():
     ghost = {(z, 2, 20): 1.0 for z in range(4)}  # where there is no point
-    result = scores(Mock(pole(5) | ghost), crop(1, 5))
+    result = scores(Given(pole(5) | ghost), crop(1, 5))
     assert result.voxel.precision == 12 / 16
     assert result.voxel_occupied.precision == 1.0
 
 
 def test_a_voxel_at_tau_is_detected():
-    assert scores(Mock(pole(5, 0.3)), crop(1, 5), tau=0.3).voxel.recall == 1.0
-    assert scores(Mock(pole(5, 0.299)), crop(1, 5), tau=0.3).voxel.recall == 0.0
+    assert scores(Given(pole(5, 0.3)), crop(1, 5), tau=0.3).voxel.recall == 1.0
+    assert scores(Given(pole(5, 0.299)), crop(1, 5), tau=0.3).voxel.recall == 0.0
 
 
 def test_a_detected_tower_far_from_every_labelled_one_is_false():
-    result = scores(Mock({}), crop(1, 5, 25), answer=towers_at(5, 15))
+    result = scores(Given({}), crop(1, 5, 25), answer=towers_at(5, 15))
     assert result.to_json()["towers"] == {
         "precision": 0.5, "recall": 0.5, "median_error_m": 0.0, "median_height_error_m": None,
         "median_base_error_m": None, "n_true": 2, "n_predicted": 2,
@@ -158,7 +158,7 @@ def test_a_detected_tower_far_from_every_labelled_one_is_false():
 
 
 def test_the_curve_of_all_crops_has_the_scores_at_tau():
-    result = scores(Mock(pole(5, 0.8) | pole(15, 0.6)), crop(1, 5), tau=0.7)
+    result = scores(Given(pole(5, 0.8) | pole(15, 0.6)), crop(1, 5), tau=0.7)
     curve = result.pr_curve
     tau = np.array(curve["tau"])
     both, one, none = tau < 0.6, (tau > 0.61) & (tau < 0.79), tau > 0.81
@@ -170,7 +170,7 @@ def test_the_curve_of_all_crops_has_the_scores_at_tau():
 
 
 def test_scores_are_plain_numbers():
-    result = scores(Mock(pole(5)), crop(1, 5))
+    result = scores(Given(pole(5)), crop(1, 5))
     assert json.loads(json.dumps(result.to_json(), allow_nan=False)) == result.to_json()
     assert Evaluation.from_json(result.to_json()) == result
 
@@ -178,14 +178,19 @@ def test_scores_are_plain_numbers():
 def test_a_model_without_tau_cannot_be_scored():
     untuned = CARD.model_copy(update={"tau": None})
     with pytest.raises(InputError, match="no detection threshold"):
-        score(Mock(), untuned, Dataset([], [], "edp", []), nothing)
+        score(Given(), untuned, Dataset([], [], "edp", []), nothing)
 
 
-def test_only_the_selected_part_is_scored(chain, pole_finder, tmp_path):
+def test_only_the_selected_part_is_scored(dataset_files, pole_finder, tmp_path):
     write_model(tmp_path / "m.json", *pole_finder)
     found = {
         part: evaluate(
-            tmp_path / "m.json", [chain.voxels], [chain.crops], chain.split, LONE_POLES, part
+            tmp_path / "m.json",
+            [dataset_files.voxels],
+            [dataset_files.crops],
+            dataset_files.split,
+            LONE_POLES,
+            part,
         )
         for part in ("train", "validation", "test")
     }
@@ -246,7 +251,10 @@ def with_truth(number: int, labelled: tuple[int, ...], true: tuple[int, ...]):
 def test_every_score_is_given_against_the_labels_and_against_the_truth():
     """The model finds the pole at 5 and none other; the label at 15 is wrong."""
     found = scores(
-        Mock(pole(5), pole(5)), with_truth(1, (5, 15), (5,)), crop(2, 15), answer=towers_at(5)
+        Given(pole(5), pole(5)),
+        with_truth(1, (5, 15), (5,)),
+        crop(2, 15),
+        answer=towers_at(5),
     )
     assert (found.voxel.precision, found.voxel.recall) == (0.5, pytest.approx(1 / 3))
     assert found.voxel.n_samples == 2
@@ -263,7 +271,7 @@ def test_every_score_is_given_against_the_labels_and_against_the_truth():
 
 
 def test_without_a_known_truth_there_are_no_scores_against_it():
-    found = scores(Mock(pole(5)), crop(1, 5))
+    found = scores(Given(pole(5)), crop(1, 5))
     assert found.truth is None and found.labels_against_truth is None
     assert found.leading is found
     assert found.to_json()["truth"] is None
@@ -279,7 +287,7 @@ def test_points_of_crops_are_summed_against_labels_and_truth():
     samples, crops = zip(with_truth(1, (5, 15), (5,)), crop(2, 15), strict=True)
     dataset = Dataset(list(samples), list(crops), "edp", [])
     found = score(
-        Mock(pole(5), pole(5)), CARD, dataset,
+        Given(pole(5), pole(5)), CARD, dataset,
         lambda sample: replace(nothing(sample), points=points[sample.id]),
     )  # fmt: skip
     assert found.points == PointScores(4 / 10, 4 / 9, 4 / 15, n_true=9, n_predicted=10)

@@ -7,6 +7,7 @@ import subprocess
 import sys
 
 import pytest
+from fixtures.kernel_file import RING
 
 from scenenet.core.errors import InputError
 from scenenet.core.provided_code import KERNELS, _provided
@@ -16,20 +17,7 @@ from scenenet.models.model_file import ModelCard, is_model_file, read_model, wri
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import ModelSettings
 
-RING = """\
-from scenenet.geneo import GeneoKernel, ShapeParameter, register, zero_sum
-from scenenet.geneo.kernel import gaussian_shell
-
-
-@register
-class Ring(GeneoKernel):
-    name = "ring"
-    parameters = (ShapeParameter("r", 0.5, 3.0, "voxel", "radius of the ring"),)
-
-    def sample(self, lattice, shape):
-        ring = gaussian_shell(lattice.planar_squared, shape["r"] ** 2, shape["r"])
-        return zero_sum(ring.expand(lattice.size), lattice.inside)
-"""
+pytestmark = pytest.mark.usefixtures("nothing_provided")
 
 BALANCED = "zero_sum(ring.expand(lattice.size), lattice.inside)"
 """What the ring returns."""
@@ -37,15 +25,6 @@ BALANCED = "zero_sum(ring.expand(lattice.size), lattice.inside)"
 CARD = ModelCard(
     name="rings", codes="edp", measurement="presence", fit="cube", resolution=64, voxel_size=1.0
 )
-
-
-@pytest.fixture(autouse=True)
-def nothing_provided(monkeypatch):
-    """Each test provides its own kernels."""
-    monkeypatch.setenv(KERNELS.variable, "")
-    _provided.cache_clear()
-    yield
-    _provided.cache_clear()
 
 
 @pytest.fixture

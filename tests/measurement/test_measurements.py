@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenenet.core.errors import InputError
-from scenenet.core.provided_code import MEASUREMENTS, _provided
+from scenenet.core.provided_code import MEASUREMENTS
 from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.interpretability.bounded_measurement import bounded
 from scenenet.measurement import PointFields, measurement_named, measurement_of_file
@@ -24,14 +24,7 @@ from scenenet.pointcloud import PointCloud, iter_chunks, read
 from scenenet.pointcloud.class_schemes import ASPRS
 from scenenet.prediction.work.tile_predictor import TilePredictor
 
-
-@pytest.fixture(autouse=True)
-def nothing_provided(monkeypatch):
-    """Each test provides its own measurements."""
-    monkeypatch.setenv(MEASUREMENTS.variable, "")
-    _provided.cache_clear()
-    yield
-    _provided.cache_clear()
+pytestmark = pytest.mark.usefixtures("nothing_provided")
 
 
 def test_the_measurements_of_the_package_say_what_their_names_say():

@@ -73,24 +73,24 @@ def wire_finder(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="package")
-def hung_line(scene, tmp_path_factory) -> Path:
+def line_with_wires(scene, tmp_path_factory) -> Path:
     """Three poles in a row, and a wire to the second one that ends before the third."""
     poles = [(x, 15.5) for x in scenes.POLES_X]
     cloud = scene(poles, size=(150.0, 31.0), tree=(100.0, 20.0))
     ends = scenes.POLES_X[0] - 45.0, *scenes.POLES_X
-    places = scenes.hung_wire(ends, 15.5, scenes.WIRE_Z, 3.0, 103.0)
+    places = scenes.wire_points(ends, 15.5, scenes.WIRE_Z, 3.0, 103.0)
     codes = np.append(cloud.classification, np.full(len(places), 16, np.uint8))
-    path = tmp_path_factory.mktemp("hung") / "line.laz"
+    path = tmp_path_factory.mktemp("line_with_wires") / "line.laz"
     write_las(path, PointCloud(np.concatenate([cloud.xyz, places]), codes, crs=pyproj.CRS(32629)))
     return path
 
 
 @pytest.fixture(scope="package")
-def hung(hung_line, model, wire_finder, tmp_path_factory) -> PredictionFiles:
-    """The results of ``hung_line`` with a voltage."""
-    files = PredictionFiles.of(hung_line, tmp_path_factory.mktemp("predicted"), line=True)
+def line_results(line_with_wires, model, wire_finder, tmp_path_factory) -> PredictionFiles:
+    """The results of ``line_with_wires`` with a voltage."""
+    files = PredictionFiles.of(line_with_wires, tmp_path_factory.mktemp("predicted"), line=True)
     predict_to_files(
-        hung_line, [model, wire_finder], files, PredictSettings(),
+        line_with_wires, [model, wire_finder], files, PredictSettings(),
         DetectionSettings(min_conductor=0), clearance=ClearanceSettings(voltage=VOLTAGE),
     )  # fmt: skip
     return files

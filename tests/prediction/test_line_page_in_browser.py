@@ -44,12 +44,12 @@ class Pages:
 
 
 @pytest.fixture(scope="module")
-def pages(hung_line, model, wire_finder, tmp_path_factory) -> Pages:
+def pages(line_with_wires, model, wire_finder, tmp_path_factory) -> Pages:
     folder = tmp_path_factory.mktemp("line-pages")
     few, many = folder / "few.html", folder / "many.html"
     with predict_survey(
-        hung_line, [model, wire_finder], PredictSettings(), DetectionSettings(min_conductor=0),
-        clearance=ClearanceSettings(voltage=66),
+        line_with_wires, [model, wire_finder], PredictSettings(),
+        DetectionSettings(min_conductor=0), clearance=ClearanceSettings(voltage=66),
     ) as prediction:  # fmt: skip
         write_page(prediction, few)
         write_many(prediction, many)

@@ -32,13 +32,13 @@ LONE_POLES = DetectionSettings(min_conductor=0)
 
 
 @pytest.fixture(scope="module")
-def line(hung_line) -> Path:
-    return hung_line
+def line(line_with_wires) -> Path:
+    return line_with_wires
 
 
 @pytest.fixture(scope="module")
-def predicted(hung) -> PredictionFiles:
-    return hung
+def predicted(line_results) -> PredictionFiles:
+    return line_results
 
 
 def rows(path: Path) -> list[dict[str, str]]:

@@ -18,7 +18,7 @@ COLUMNS = ("id", "x", "y", "decision", "comment", "reviewer", "base", "height")
 ADDED = (PLACE[0] + 95.5, PLACE[1] + 33.5)
 
 
-def said(**cells: object) -> list[object]:
+def _row(**cells: object) -> list[object]:
     """A row of a review file."""
     return [cells.get(column, "") for column in COLUMNS]
 
@@ -28,11 +28,11 @@ def decisions(towers, tmp_path) -> Path:
     """A tower accepted, one rejected by its place, one with a comment, one added."""
     x, y = place(towers[1])
     rows = [
-        said(id=towers[0]["id"], decision="accept", comment="seen", reviewer="Ana"),
-        said(x=x + 1.5, y=y - 1, decision="Reject", comment="a crane", reviewer="João"),
-        said(id=towers[2]["id"], comment="leans"),
-        said(x=ADDED[0], y=ADDED[1], decision="add", reviewer="Ana", height=8.0),
-        said(id=towers[3]["id"]),
+        _row(id=towers[0]["id"], decision="accept", comment="seen", reviewer="Ana"),
+        _row(x=x + 1.5, y=y - 1, decision="Reject", comment="a crane", reviewer="João"),
+        _row(id=towers[2]["id"], comment="leans"),
+        _row(x=ADDED[0], y=ADDED[1], decision="add", reviewer="Ana", height=8.0),
+        _row(id=towers[3]["id"]),
     ]
     return write_rows(tmp_path / "review.csv", COLUMNS, rows)
 
@@ -167,9 +167,9 @@ def test_a_file_of_a_spreadsheet_and_a_layer_in_another_system(call, found, towe
 
 def test_a_row_that_matches_nothing_is_reported_and_the_others_count(call, found, towers, tmp_path):
     rows = [
-        said(x=PLACE[0] + 35, y=PLACE[1] + 5, decision="reject"),
-        said(id=towers[0]["id"], decision="accept"),
-        said(x=PLACE[0] - 500, y=PLACE[1], decision="add"),
+        _row(x=PLACE[0] + 35, y=PLACE[1] + 5, decision="reject"),
+        _row(id=towers[0]["id"], decision="accept"),
+        _row(x=PLACE[0] - 500, y=PLACE[1], decision="add"),
     ]
     path = write_rows(tmp_path / "review.csv", COLUMNS, rows)
     done = call("review", found, "--decisions", path, "--out", tmp_path, "--json")
@@ -182,18 +182,18 @@ def test_a_row_that_matches_nothing_is_reported_and_the_others_count(call, found
 
 
 FAULTS = {
-    "unknown id": (said(id=77, decision="accept"), "no tower of line.towers.csv has the id 77"),
-    "unknown decision": (said(id="{0}", decision="maybe"), "'maybe' is no decision"),
-    "no tower": (said(decision="reject"), "it names no tower"),
-    "no place": (said(decision="add"), "a tower is added without coordinates"),
-    "half a place": (said(x=1, decision="add"), "it has no y"),
-    "no number": (said(x="abc", y=2, decision="add"), "'abc' in column 'x' is no number"),
-    "half an id": (said(id="12.5", decision="accept"), "is no whole number"),
-    "own id": (said(id=5, x=500_000, y=4_630_000, decision="add"), "is added with the id 5"),
+    "unknown id": (_row(id=77, decision="accept"), "no tower of line.towers.csv has the id 77"),
+    "unknown decision": (_row(id="{0}", decision="maybe"), "'maybe' is no decision"),
+    "no tower": (_row(decision="reject"), "it names no tower"),
+    "no place": (_row(decision="add"), "a tower is added without coordinates"),
+    "half a place": (_row(x=1, decision="add"), "it has no y"),
+    "no number": (_row(x="abc", y=2, decision="add"), "'abc' in column 'x' is no number"),
+    "half an id": (_row(id="12.5", decision="accept"), "is no whole number"),
+    "own id": (_row(id=5, x=500_000, y=4_630_000, decision="add"), "is added with the id 5"),
     "elsewhere": (
-        said(id="{0}", x=500_200, y=4_630_020, decision="accept"), "from the coordinates of this",
+        _row(id="{0}", x=500_200, y=4_630_020, decision="accept"), "from the coordinates of this",
     ),
-    "occupied": (said(x="{x}", y="{y}", decision="add"), "a tower is added within 2 m of tower"),
+    "occupied": (_row(x="{x}", y="{y}", decision="add"), "a tower is added within 2 m of tower"),
 }  # fmt: skip
 
 
@@ -204,9 +204,9 @@ def test_each_fault_is_named_with_its_row_and_nothing_is_written(
     row, message = FAULTS[fault]
     known = {"{0}": towers[0]["id"], "{x}": towers[0]["x"], "{y}": towers[0]["y"]}
     rows = [
-        said(id=towers[1]["id"], decision="accept"),
+        _row(id=towers[1]["id"], decision="accept"),
         [known.get(str(cell), cell) for cell in row],
-        said(id=99, decision="reject"),
+        _row(id=99, decision="reject"),
     ]
     path = write_rows(tmp_path / "review.csv", COLUMNS, rows)
     done = call("review", found, "--decisions", path, "--out", tmp_path / "out")
@@ -221,12 +221,12 @@ def test_each_fault_is_named_with_its_row_and_nothing_is_written(
 def test_rows_that_contradict_each_other_are_named(call, found, towers, tmp_path):
     number, (x, y) = towers[0]["id"], place(towers[0])
     first = write_rows(
-        tmp_path / "one.csv", COLUMNS, [said(id=number, decision="accept", reviewer="Ana")]
+        tmp_path / "one.csv", COLUMNS, [_row(id=number, decision="accept", reviewer="Ana")]
     )
     rows = [
-        said(x=x, y=y, decision="reject"),
-        said(x=x + 15, y=y, decision="add"),
-        said(x=x + 16, y=y, decision="add"),
+        _row(x=x, y=y, decision="reject"),
+        _row(x=x + 15, y=y, decision="add"),
+        _row(x=x + 16, y=y, decision="add"),
     ]
     second = write_rows(tmp_path / "two.csv", COLUMNS, rows)
     files = ("--decisions", first, "--decisions", second, "--out", tmp_path / "out")
@@ -238,7 +238,10 @@ def test_rows_that_contradict_each_other_are_named(call, found, towers, tmp_path
 
 def test_a_tower_is_moved_by_rejecting_and_adding_it(call, found, towers, tmp_path):
     x, y = place(towers[0])
-    rows = [said(id=towers[0]["id"], decision="reject"), said(x=x + 0.5, y=y, decision="add")]
+    rows = [
+        _row(id=towers[0]["id"], decision="reject"),
+        _row(x=x + 0.5, y=y, decision="add"),
+    ]
     path = write_rows(tmp_path / "review.csv", COLUMNS, rows)
     assert call("review", found, "--decisions", path, "--out", tmp_path).code == 0
     ids = [row["id"] for row in rows_of(tmp_path / "line.reviewed.csv")]
@@ -289,7 +292,7 @@ def test_a_survey_without_towers_can_be_reviewed_and_compared(call, found, tmp_p
         assert done.code == 0, done.err
         assert json.loads(done.out)["counts"]["found"] == 0
     review = write_rows(
-        tmp_path / "add.csv", COLUMNS, [said(x=ADDED[0], y=ADDED[1], decision="add")]
+        tmp_path / "add.csv", COLUMNS, [_row(x=ADDED[0], y=ADDED[1], decision="add")]
     )
     labels = ("--labels", tmp_path / "labelled.laz", "--codes", "asprs")
     assert call("review", tmp_path, "--decisions", review, *labels).code == 0

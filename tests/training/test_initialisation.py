@@ -8,7 +8,6 @@ import torch
 
 from scenenet.convolution.convolve import convolve_at_voxels
 from scenenet.dataset.batches import batch
-from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.geneo import kernel_named
 from scenenet.models.factory import new_model
 from scenenet.models.predictions import threshold_curve
@@ -19,9 +18,8 @@ from scenenet.training.train import fit
 
 
 @pytest.fixture(scope="module")
-def toys(scene):
-    clouds = [scene(((8.5 + i, 9.5),), size=(20, 20), tree=(14, 4 + i), seed=i) for i in range(3)]
-    return [voxelise(c, VoxelGrid.metric(c.xyz, 1.0), f"toy-{i}") for i, c in enumerate(clouds)]
+def crops(pole_crops):
+    return pole_crops()[:3]
 
 
 def settings(kind: str, init: str = "informed", epochs: int = 20) -> ModelSettings:
@@ -33,14 +31,14 @@ def best(model, samples) -> float:
     return threshold_curve(model, samples, "presence").best()[1].f05
 
 
-def test_the_discriminant_separates_towers_better_than_a_mean_difference(toys):
+def test_the_discriminant_separates_towers_better_than_a_mean_difference(crops):
     size = (5, 5, 5)
-    kernel = discriminant(toys, "presence", size)
+    kernel = discriminant(crops, "presence", size)
     assert kernel.shape == size
 
     def separation(direction: torch.Tensor) -> float:
         answers, towers = [], []
-        for sample in toys:
+        for sample in crops:
             occupancy, _ = batch([sample], "presence")
             answers.append(convolve_at_voxels(occupancy, direction[None])[0].numpy())
             towers.append(sample.labelled)
@@ -56,27 +54,27 @@ def test_the_discriminant_separates_towers_better_than_a_mean_difference(toys):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-def test_the_initial_model_separates_towers_from_the_rest(toys, kind, seed):
-    assert best(informed_model(settings(kind), seed, toys), toys) > 0.2
+def test_the_initial_model_separates_towers_from_the_rest(crops, kind, seed):
+    assert best(informed_model(settings(kind), seed, crops), crops) > 0.2
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_cnn_is_alive_after_training(toys, seed):
-    model, _ = fit(toys, [], settings("cnn"), seed)
-    assert best(model, toys) > 0.2
+def test_a_cnn_is_alive_after_training(crops, seed):
+    model, _ = fit(crops, [], settings("cnn"), seed)
+    assert best(model, crops) > 0.2
 
 
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-def test_initial_models_differ_between_seeds_and_are_reproducible(toys, kind):
-    one, same, other = (informed_model(settings(kind), s, toys) for s in (1, 1, 2))
+def test_initial_models_differ_between_seeds_and_are_reproducible(crops, kind):
+    one, same, other = (informed_model(settings(kind), s, crops) for s in (1, 1, 2))
     for a, b in zip(one.parameters(), same.parameters(), strict=True):
         assert torch.equal(a, b)
     pairs = zip(one.parameters(), other.parameters(), strict=True)
     assert any(not torch.equal(a, b) for a, b in pairs)
 
 
-def test_the_initial_model_of_the_thesis_is_drawn_from_the_ranges(toys):
-    initial = starting_model(settings("scenenet", "thesis"), 3, toys)
+def test_the_initial_model_of_the_thesis_is_drawn_from_the_ranges(crops):
+    initial = starting_model(settings("scenenet", "thesis"), 3, crops)
     drawn = new_model(settings("scenenet", "thesis"), 3)
     assert initial.shape_parameters() == drawn.shape_parameters()
     for name in initial.names:
@@ -85,22 +83,23 @@ def test_the_initial_model_of_the_thesis_is_drawn_from_the_ranges(toys):
             assert parameter.low <= value <= parameter.high
 
 
-def test_unranged_parameters_are_normal_and_mostly_outside_the_ranges(toys):
+def test_unranged_parameters_are_normal_and_mostly_outside_the_ranges(crops):
     vectors = [
-        starting_model(settings("scenenet", "unranged"), seed, toys).numbers() for seed in range(60)
+        starting_model(settings("scenenet", "unranged"), seed, crops).numbers()
+        for seed in range(60)
     ]
     drawn = np.concatenate(vectors)
     assert abs(drawn.mean()) < 0.15
     assert abs(drawn.std() - 1) < 0.1
     assert 0.4 < (drawn < 0).mean() < 0.6
-    again = starting_model(settings("scenenet", "unranged"), 7, toys).numbers()
+    again = starting_model(settings("scenenet", "unranged"), 7, crops).numbers()
     np.testing.assert_array_equal(vectors[7], again)
 
 
-def test_handcrafted_values_are_in_their_ranges_and_equal_for_every_seed(toys):
+def test_handcrafted_values_are_in_their_ranges_and_equal_for_every_seed(crops):
     chosen = settings("scenenet", "handcrafted")
     chosen = chosen.model_copy(update={"geneos": ("cylinder", "arrow", "negative_sphere", "arrow")})
-    one, other = (starting_model(chosen, seed, toys) for seed in (0, 1))
+    one, other = (starting_model(chosen, seed, crops) for seed in (0, 1))
     numbers = one.shape_parameters()
     assert numbers == other.shape_parameters()
     for name, geneo in zip(one.names, one.geneos, strict=True):
@@ -116,9 +115,9 @@ def test_unranged_initialisation_of_a_cnn_is_refused(init):
         settings("cnn", init)
 
 
-def test_published_weights_are_the_same_for_every_seed(toys):
+def test_published_weights_are_the_same_for_every_seed(crops):
     published = settings("scenenet", "published")
-    models = [starting_model(published, seed, toys) for seed in (0, 1)]
+    models = [starting_model(published, seed, crops) for seed in (0, 1)]
     for model in models:
         assert model.shape_parameters() == pytest.approx(WEIGHTS, abs=1e-5)
 

@@ -14,7 +14,7 @@ from scenenet.cli.inputs import Failures
 from scenenet.cli.labelled_files import read_labelled
 from scenenet.core.errors import InputError
 from scenenet.dataset.tower_shapes import TowerShape
-from scenenet.dataset.voxels import VoxelGrid, VoxelSettings, voxelise
+from scenenet.dataset.voxels import VoxelSettings
 from scenenet.models.evidence import Evidence
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import read_model, write_model
@@ -47,11 +47,9 @@ def settings(**changes) -> ModelSettings:
 
 
 @pytest.fixture(scope="module")
-def toys(scene):
-    """Three toy crops with a pole each and a known shape."""
-    clouds = [scene(((8.5 + i, 9.5),), size=(20, 20), tree=(14, 4 + i), seed=i) for i in range(3)]
-    samples = [voxelise(c, VoxelGrid.metric(c.xyz, 1.0), f"toy-{i}") for i, c in enumerate(clouds)]
-    return [replace(sample, shape=SHAPE) for sample in samples]
+def crops(pole_crops):
+    """Three crops with a pole of known shape each."""
+    return [replace(crop, shape=SHAPE) for crop in pole_crops()[:3]]
 
 
 @pytest.mark.parametrize(("width", "reach"), [(0.3, 1.0), (1.0, 3.0)])
@@ -70,10 +68,10 @@ def test_radius_and_reach_of_a_model_follow_those_of_the_towers(tmp_path, width,
     assert found["arrow.r"] == found["cylinder.r"]
 
 
-def test_a_measured_number_is_the_median_over_the_towers(toys):
+def test_a_measured_number_is_the_median_over_the_towers(crops):
     widths = (0.3, 0.4, 0.5)
     shapes = [replace(SHAPE, half_width=w, reach=None, reach_spread=None) for w in widths]
-    samples = [replace(s, shape=shape) for s, shape in zip(toys, shapes, strict=True)]
+    samples = [replace(s, shape=shape) for s, shape in zip(crops, shapes, strict=True)]
     found = measure(net(), samples)
     assert found.keys() == {"cylinder.r", "cylinder.sigma", "arrow.r"}  # no tower shows a reach
     assert found["cylinder.r"].value == pytest.approx(0.4)
@@ -84,8 +82,8 @@ def test_a_measured_number_is_the_median_over_the_towers(toys):
     assert measure(net(), [replace(s, shape=None) for s in samples]) == {}
 
 
-def test_the_search_leaves_measured_and_fixed_numbers_alone(toys, tmp_path):
-    model, history = fit(toys, [], settings(), 0)
+def test_the_search_leaves_measured_and_fixed_numbers_alone(crops, tmp_path):
+    model, history = fit(crops, [], settings(), 0)
     numbers = model.shape_parameters()
     for name, value in (MEASURED | {"arrow.beta": 1.0}).items():
         assert numbers[name] == pytest.approx(value, rel=1e-4)
@@ -102,22 +100,22 @@ def test_the_search_leaves_measured_and_fixed_numbers_alone(toys, tmp_path):
     assert again.metric.numbers == "measured"
     torch.testing.assert_close(again.observer()[0], model.at(0.9).observer()[0])
     # A model that is only scored has the same numbers, and nothing is said about them.
-    scored, _ = fit(toys, [], settings(), 0, with_evidence=False)
+    scored, _ = fit(crops, [], settings(), 0, with_evidence=False)
     assert scored.shape_parameters() == pytest.approx(numbers, rel=1e-6)  # weights are set again
     assert scored.evidence == {}
 
 
-def test_three_numbers_do_without_the_head_and_the_sphere(toys):
+def test_three_numbers_do_without_the_head_and_the_sphere(crops):
     """With the surroundings in place of both, only one mixing weight is searched."""
-    model, history = fit(toys, [], settings(geneos=["cylinder", "surroundings"]), 0)
+    model, history = fit(crops, [], settings(geneos=["cylinder", "surroundings"]), 0)
     assert model.n_parameters() == 3
     searched = {name for name, said in model.evidence.items() if said.source == "score"}
     assert searched == {"lambda.cylinder", "lambda.surroundings"}
     assert history["loss"].iloc[-1] < 0.5
 
 
-def test_one_kernel_has_nothing_to_search(toys):
-    model, _ = fit(toys, [], settings(geneos=["cylinder"]), 0)
+def test_one_kernel_has_nothing_to_search(crops):
+    model, _ = fit(crops, [], settings(geneos=["cylinder"]), 0)
     assert model.shape_parameters()["cylinder.r"] == pytest.approx(0.4)
 
 

@@ -12,7 +12,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenenet.core.errors import InputError
-from scenenet.dataset.voxels import VoxelGrid, voxelise
 from scenenet.geneo import kernel_named
 from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import ModelCard, read_model, write_model
@@ -39,19 +38,14 @@ def net(seed: int = 0, lengths: MetricSettings = SMALL) -> SceneNet:
 
 
 @pytest.fixture(scope="module")
-def toys(scene):
-    """Four toy crops with a pole each, of voxels of 0.9 to 1.2 m."""
-    clouds = [scene(((8.5 + i, 9.5),), size=(20, 20), tree=(14, 4 + i), seed=i) for i in range(4)]
-    return [
-        voxelise(c, VoxelGrid.metric(c.xyz, 0.9 + 0.1 * i), f"toy-{i}")
-        for i, c in enumerate(clouds)
-    ]
+def crops(pole_crops):
+    return pole_crops(tuple(0.9 + 0.1 * i for i in range(4)))
 
 
 @pytest.fixture(scope="module")
-def searched(toys):
+def searched(crops):
     """A model after a search, and its history."""
-    return fit(toys[:3], toys[3:], settings(15), 0)
+    return fit(crops[:3], crops[3:], settings(15), 0)
 
 
 def assert_constrained(numbers: dict[str, float]) -> None:
@@ -97,13 +91,13 @@ def test_the_search_finds_the_poles_and_gets_no_worse(searched):
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_no_initial_model_is_dead(toys, seed):
-    model, _ = fit(toys[:3], [], settings(2), seed)
-    assert threshold_curve(model, toys[:3], "presence").best()[1].f05 > 0.3
+def test_no_initial_model_is_dead(crops, seed):
+    model, _ = fit(crops[:3], [], settings(2), seed)
+    assert threshold_curve(model, crops[:3], "presence").best()[1].f05 > 0.3
 
 
-def test_same_seed_same_numbers_and_other_seed_other_numbers(toys):
-    (a, one), (b, two), (c, _) = (fit(toys[:1], toys[3:], settings(3), s) for s in (1, 1, 2))
+def test_same_seed_same_numbers_and_other_seed_other_numbers(crops):
+    (a, one), (b, two), (c, _) = (fit(crops[:1], crops[3:], settings(3), s) for s in (1, 1, 2))
     assert a.numbers().tolist() == b.numbers().tolist()
     assert a.numbers().tolist() != c.numbers().tolist()
     pd.testing.assert_frame_equal(
@@ -115,8 +109,8 @@ class PowerCut(Exception):
     pass
 
 
-def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
-    straight, straight_history = fit(toys[:1], [], settings(5), 1)
+def test_a_resumed_search_is_the_uninterrupted_one(crops, tmp_path, monkeypatch):
+    straight, straight_history = fit(crops[:1], [], settings(5), 1)
     original, done = metric_search.advance, iter(range(2 * 2 + 1))  # trials and one more
 
     def interrupted(*args):
@@ -126,23 +120,23 @@ def test_a_resumed_search_is_the_uninterrupted_one(toys, tmp_path, monkeypatch):
 
     monkeypatch.setattr(metric_search, "advance", interrupted)
     with pytest.raises(PowerCut):
-        fit(toys[:1], [], settings(5), 1, checkpoint=tmp_path / "c")
+        fit(crops[:1], [], settings(5), 1, checkpoint=tmp_path / "c")
     monkeypatch.undo()
     monkeypatch.setattr(metric_search, "begin", None)  # a search that starts again fails
-    resumed, history = fit(toys[:1], [], settings(5), 1, checkpoint=tmp_path / "c")
+    resumed, history = fit(crops[:1], [], settings(5), 1, checkpoint=tmp_path / "c")
     assert resumed.numbers().tolist() == straight.numbers().tolist()
     pd.testing.assert_frame_equal(
         history.drop(columns="seconds"), straight_history.drop(columns="seconds"), check_exact=True
     )
 
 
-def test_a_checkpoint_of_something_else_is_ignored(toys, tmp_path):
+def test_a_checkpoint_of_something_else_is_ignored(crops, tmp_path):
     another_seed, noise = tmp_path / "c", tmp_path / "noise"
-    fit(toys[:1], [], settings(2), 7, checkpoint=another_seed)
+    fit(crops[:1], [], settings(2), 7, checkpoint=another_seed)
     noise.write_bytes(another_seed.read_bytes()[:40])
-    fresh, _ = fit(toys[:1], [], settings(2), 1)
+    fresh, _ = fit(crops[:1], [], settings(2), 1)
     for checkpoint in (another_seed, noise):
-        model, history = fit(toys[:1], [], settings(2), 1, checkpoint=checkpoint)
+        model, history = fit(crops[:1], [], settings(2), 1, checkpoint=checkpoint)
         assert len(history) == 2
         assert model.numbers().tolist() == fresh.numbers().tolist()
 
@@ -202,10 +196,10 @@ def test_kernels_lie_within_their_lengths_and_sum_to_zero():
     torch.testing.assert_close(kernels.rot90(1, (2, 3)), kernels)
 
 
-def test_an_empty_voxel_has_probability_0(toys):
-    probability, _ = probabilities(net(3), toys[0], "presence")
+def test_an_empty_voxel_has_probability_0(crops):
+    probability, _ = probabilities(net(3), crops[0], "presence")
     empty = np.ones(len(probability), bool)
-    empty[toys[0].index] = False
+    empty[crops[0].index] = False
     assert (probability[empty] == 0).all()
     assert probability.max() <= 1
 
@@ -264,11 +258,11 @@ def test_a_model_in_metres_has_no_other_kernel_size():
         net().with_kernel_size((9, 9, 9))
 
 
-def test_tau_is_chosen_on_the_training_crops_as_well(toys, searched):
+def test_tau_is_chosen_on_the_training_crops_as_well(crops, searched):
     model, _ = searched
     sizes = TuningSettings(kernel_sizes=((9, 5, 5),))
-    _, card, result = choose(model, card_for(model), toys[3:], sizes, toys[:3])
-    everything = threshold_curve(model, toys, "presence")
+    _, card, result = choose(model, card_for(model), crops[3:], sizes, crops[:3])
+    everything = threshold_curve(model, crops, "presence")
     assert len(result.kernel_sizes) == 1
     assert card.tau in everything.tau
     assert result.validation.n_samples == 1

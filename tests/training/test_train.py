@@ -20,10 +20,8 @@ from scenenet.training.train import fit, train
 
 
 @pytest.fixture(scope="module")
-def toys(scene):
-    """Four toy crops with a pole each."""
-    clouds = [scene(((8.5 + i, 9.5),), size=(20, 20), tree=(14, 4 + i), seed=i) for i in range(4)]
-    return [voxelise(c, VoxelGrid.metric(c.xyz, 1.0), f"toy-{i}") for i, c in enumerate(clouds)]
+def crops(pole_crops):
+    return pole_crops()
 
 
 def settings(kind="scenenet", epochs=6, **changes) -> ModelSettings:
@@ -40,17 +38,17 @@ def numbers(model) -> list[float]:
     return torch.cat([p.detach().flatten() for p in model.parameters()]).tolist()
 
 
-def test_the_loss_falls_on_a_pole_in_a_field(toys):
-    _, history = fit(toys[:3], toys[3:], settings(epochs=30), seed=0)
+def test_the_loss_falls_on_a_pole_in_a_field(crops):
+    _, history = fit(crops[:3], crops[3:], settings(epochs=30), seed=0)
     assert history["fidelity"].iloc[-1] < 0.7 * history["fidelity"].iloc[0]
     assert history["validation_loss"].iloc[-1] < history["validation_loss"].iloc[0]
     assert history["validation_f05"].iloc[-1] > 0.5
 
 
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-def test_same_seed_same_numbers_and_other_seed_other_numbers(toys, kind):
+def test_same_seed_same_numbers_and_other_seed_other_numbers(crops, kind):
     (a, history_a), (b, history_b), (c, _) = (
-        fit(toys[:3], toys[3:], settings(kind, epochs=3), seed) for seed in (1, 1, 2)
+        fit(crops[:3], crops[3:], settings(kind, epochs=3), seed) for seed in (1, 1, 2)
     )
     assert numbers(a) == numbers(b)
     assert numbers(a) != numbers(c)
@@ -98,14 +96,14 @@ def cut_after(monkeypatch):
     ],
     ids=str,
 )
-def test_a_resumed_training_is_the_uninterrupted_one(toys, cut_after, tmp_path, kind, changes):
+def test_a_resumed_training_is_the_uninterrupted_one(crops, cut_after, tmp_path, kind, changes):
     chosen = settings(kind, epochs=5, **changes)
-    straight, straight_history = fit(toys[:3], toys[3:], chosen, 1)
+    straight, straight_history = fit(crops[:3], crops[3:], chosen, 1)
     undo = cut_after(2)
     with pytest.raises(PowerCut):
-        fit(toys[:3], toys[3:], chosen, 1, checkpoint=tmp_path / "c")
+        fit(crops[:3], crops[3:], chosen, 1, checkpoint=tmp_path / "c")
     undo()
-    resumed, history = fit(toys[:3], toys[3:], chosen, 1, checkpoint=tmp_path / "c")
+    resumed, history = fit(crops[:3], crops[3:], chosen, 1, checkpoint=tmp_path / "c")
     assert numbers(resumed) == numbers(straight)
     assert history["epoch"].tolist() == [1, 2, 3, 4, 5]
     pd.testing.assert_frame_equal(
@@ -124,9 +122,9 @@ def test_the_rate_is_that_of_torchs_own_schedule():
     assert {TrainingSettings(learning_rate=0.4).rate(epoch) for epoch in range(1, 99)} == {0.4}
 
 
-def test_a_rate_that_has_decayed_moves_less(toys):
+def test_a_rate_that_has_decayed_moves_less(crops):
     whole, decayed = (
-        fit(toys[:3], [], settings(epochs=4, decay=share, decay_every=1), 0)[1]
+        fit(crops[:3], [], settings(epochs=4, decay=share, decay_every=1), 0)[1]
         for share in (0.0, 0.9)
     )
     assert whole["cylinder.r"].iloc[0] == decayed["cylinder.r"].iloc[0]
@@ -135,13 +133,13 @@ def test_a_rate_that_has_decayed_moves_less(toys):
 
 
 @pytest.mark.parametrize("kind", ["scenenet", "cnn"])
-def test_cross_entropy_falls_and_is_the_validation_loss(toys, kind):
+def test_cross_entropy_falls_and_is_the_validation_loss(crops, kind):
     init = "informed" if kind == "cnn" else "thesis"
     chosen = settings(kind, epochs=30, init=init, loss=LossSettings(fidelity="cross_entropy"))
-    model, history = fit(toys[:3], toys[3:], chosen, seed=0)
+    model, history = fit(crops[:3], crops[3:], chosen, seed=0)
     assert history["fidelity"].iloc[-1] < 0.9 * history["fidelity"].iloc[0]
-    occupancy, towers = batch(toys[3:], "presence")
-    n_tower, n = sum(t.labelled.sum() for t in toys[:3]), sum(t.grid.n_voxels for t in toys[:3])
+    occupancy, towers = batch(crops[3:], "presence")
+    n_tower, n = sum(t.labelled.sum() for t in crops[:3]), sum(t.grid.n_voxels for t in crops[:3])
     weights = VoxelWeights.of_counts(n_tower, n, alpha=5.0, epsilon=0.1)
     with torch.no_grad():
         recomputed = fidelity(model, occupancy, towers, weights, "cross_entropy").item()
@@ -149,14 +147,14 @@ def test_cross_entropy_falls_and_is_the_validation_loss(toys, kind):
 
 
 @pytest.mark.parametrize("what", ["settings", "seed", "samples", "nothing but noise"])
-def test_a_checkpoint_of_something_else_is_ignored(toys, cut_after, tmp_path, what):
+def test_a_checkpoint_of_something_else_is_ignored(crops, cut_after, tmp_path, what):
     checkpoint = tmp_path / "c"
     chosen = settings(epochs=3)
     other_settings = settings(epochs=3, loss=LossSettings(alpha=1.0))
     undo = cut_after(2)
     with pytest.raises(PowerCut):
         fit(
-            toys[1:] if what == "samples" else toys[:3],
+            crops[1:] if what == "samples" else crops[:3],
             [],
             other_settings if what == "settings" else chosen,
             7 if what == "seed" else 1,
@@ -166,21 +164,21 @@ def test_a_checkpoint_of_something_else_is_ignored(toys, cut_after, tmp_path, wh
     assert checkpoint.is_file()
     if what == "nothing but noise":
         checkpoint.write_bytes(checkpoint.read_bytes()[:50])
-    fresh, _ = fit(toys[:3], [], chosen, 1)
-    model, history = fit(toys[:3], [], chosen, 1, checkpoint=checkpoint)
+    fresh, _ = fit(crops[:3], [], chosen, 1)
+    model, history = fit(crops[:3], [], chosen, 1, checkpoint=checkpoint)
     assert len(history) == 3
     assert numbers(model) == numbers(fresh)
 
 
-def test_a_training_that_diverges_is_refused(toys):
+def test_a_training_that_diverges_is_refused(crops):
     """The loss of the first epoch is that of the start, and the step after it overflows."""
     chosen = settings(epochs=1, optimiser="sgd", learning_rate=1e38, batch_size=3)
     with pytest.raises(LostTraining, match=r"m from seed 1 diverged: after epoch 1 .*lower"):
-        fit(toys[:3], [], chosen, 1)
+        fit(crops[:3], [], chosen, 1)
 
 
-def test_history_has_a_row_per_epoch_and_a_column_per_parameter(toys):
-    model, history = fit(toys[:3], toys[3:], settings(epochs=4), 0)
+def test_history_has_a_row_per_epoch_and_a_column_per_parameter(crops):
+    model, history = fit(crops[:3], crops[3:], settings(epochs=4), 0)
     assert history["epoch"].tolist() == [1, 2, 3, 4]
     assert history.columns[:7].tolist() == [
         "epoch", "loss", "fidelity", "penalty", "seconds", "validation_loss", "validation_f05",
@@ -191,8 +189,8 @@ def test_history_has_a_row_per_epoch_and_a_column_per_parameter(toys):
     np.testing.assert_allclose(history["loss"], history["fidelity"] + history["penalty"], rtol=1e-6)
 
 
-def test_a_cnn_has_no_columns_for_its_2190_numbers(toys):
-    _, history = fit(toys[:3], [], settings("cnn", epochs=1), 0)
+def test_a_cnn_has_no_columns_for_its_2190_numbers(crops):
+    _, history = fit(crops[:3], [], settings("cnn", epochs=1), 0)
     assert len(history.columns) == 7
     assert np.isnan(history["validation_loss"].iloc[0])
 
@@ -205,14 +203,14 @@ def test_training_without_tower_voxels_is_refused(scene, poles):
         fit(samples, [], settings(), 0)
 
 
-def test_order_of_validation_samples_does_not_matter(toys, pole_finder):
+def test_order_of_validation_samples_does_not_matter(crops, pole_finder):
     model, _ = pole_finder
-    forth = threshold_curve(model, toys, "presence")
-    back = threshold_curve(model, toys[::-1], "presence")
+    forth = threshold_curve(model, crops, "presence")
+    back = threshold_curve(model, crops[::-1], "presence")
     np.testing.assert_array_equal(forth.true, back.true)
     np.testing.assert_array_equal(forth.false, back.false)
-    assert forth.true.sum() == sum(s.labelled.sum() for s in toys)
-    assert forth.true.sum() + forth.false.sum() == sum(s.grid.n_voxels for s in toys)
+    assert forth.true.sum() == sum(s.labelled.sum() for s in crops)
+    assert forth.true.sum() + forth.false.sum() == sum(s.grid.n_voxels for s in crops)
 
 
 def test_crops_of_different_sizes_are_predicted_alike_in_a_batch_and_alone(scene, pole_finder):
@@ -234,11 +232,12 @@ def test_crops_of_different_sizes_are_predicted_alike_in_a_batch_and_alone(scene
     np.testing.assert_array_equal(flat[towers], np.concatenate(expected))
 
 
-def test_training_writes_model_and_history_and_removes_its_checkpoint(chain, tmp_path):
+def test_training_writes_model_and_history_and_removes_its_checkpoint(dataset_files, tmp_path):
     out = {name: tmp_path / name for name in ("model.json", "history.csv", "checkpoint")}
     train(
-        [chain.voxels], chain.split, settings(epochs=2), 3, out["model.json"], out["history.csv"],
-        out["checkpoint"], VoxelSettings(fit="metric", voxel_size=1.0), {"config": "abc"},
+        [dataset_files.voxels], dataset_files.split, settings(epochs=2), 3, out["model.json"],
+        out["history.csv"], out["checkpoint"], VoxelSettings(fit="metric", voxel_size=1.0),
+        {"config": "abc"},
     )  # fmt: skip
     model, card = read_model(out["model.json"])
     history = pd.read_csv(out["history.csv"])

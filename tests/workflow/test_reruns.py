@@ -8,6 +8,7 @@ import shutil
 import sqlite3
 
 import pytest
+from fixtures.kernel_file import RING
 
 pytestmark = pytest.mark.workflow
 
@@ -58,23 +59,6 @@ FROM_CROPS = {**LEARNED, "voxelisation_time": 1, "dataset_tables": 1}
 """Jobs after a change of the crops."""
 SETTINGS = {"resolved_config": 1}
 """The resolved configuration is written after each change of a setting."""
-
-
-RING = """\
-from scenenet.geneo import GeneoKernel, ShapeParameter, register, zero_sum
-from scenenet.geneo.kernel import gaussian_shell
-
-
-@register
-class Ring(GeneoKernel):
-    name = "ring"
-    parameters = (ShapeParameter("r", 0.5, 3.0, "voxel", "radius of the ring"),)
-
-    def sample(self, lattice, shape):
-        ring = gaussian_shell(lattice.planar_squared, shape["r"] ** 2, shape["r"])
-        return zero_sum(ring.expand(lattice.size), lattice.inside)
-"""
-"""A kernel file of a user."""
 
 MISSING = re.compile(r"Missing output files: ([^;\n]+)")
 

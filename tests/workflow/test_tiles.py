@@ -14,7 +14,7 @@ import pyproj
 import pytest
 import yaml
 from fixtures.project import PARTS, copy_parts
-from fixtures.scenes import hung_wire, make_wire_finder
+from fixtures.scenes import make_wire_finder, wire_points
 
 from scenenet.models.model_file import write_model
 from scenenet.pointcloud import PointCloud, write_las
@@ -61,7 +61,7 @@ def first(project_in, project_root, tmp_path_factory, pole_finder, scene):
     project.add_row("first", "{results_dir}/synthetic/first.laz", "edp", "train")
     near = scene([(15.5, 15.5), (60.5, 15.5), (105.5, 15.5)], size=(121.0, 31.0), tree=(40.0, 20.0))
     far = scene([(15.5, 15.5)], size=(31.0, 31.0), tree=None, seed=3)
-    wire = hung_wire((15.5, 60.5, 105.5), 15.5, 13.8, 15.5, 105.5)
+    wire = wire_points((15.5, 60.5, 105.5), 15.5, 13.8, 15.5, 105.5)
     xyz = np.concatenate([near.xyz, wire, far.xyz + np.array([3000.0, 0, 0])])
     codes = np.concatenate([near.classification, np.full(len(wire), 16), far.classification])
     codes = codes.astype(np.uint8)

@@ -10,7 +10,7 @@ from scenenet.pointcloud.quality.check import check_survey
 from scenenet.pointcloud.quality.screening import survey_warnings
 
 
-def said(tmp_path, density: float, side: float = 60.0) -> list[str]:
+def gap_warnings(tmp_path, density: float, side: float = 60.0) -> list[str]:
     rng = np.random.default_rng(0)
     xyz = rng.uniform(0, [side, side, 1], (round(density * side**2), 3)) + np.array(
         [545_000, 4_633_800, 200]
@@ -24,15 +24,15 @@ def said(tmp_path, density: float, side: float = 60.0) -> list[str]:
 
 @pytest.mark.parametrize("density", [2.0, 5.0, 9.0])
 def test_a_thin_survey_is_said_with_its_density(tmp_path, density):
-    (text,) = said(tmp_path, density)
+    (text,) = gap_warnings(tmp_path, density)
     figure = float(text.split("about ")[1].split(" points")[0])
     assert figure == pytest.approx(density, rel=0.2)
 
 
 @pytest.mark.parametrize("density", [20.0, 80.0])
 def test_a_dense_survey_is_not(tmp_path, density):
-    assert said(tmp_path, density) == []
+    assert gap_warnings(tmp_path, density) == []
 
 
 def test_a_survey_so_thin_that_the_unit_is_in_doubt_has_one_warning(tmp_path):
-    assert said(tmp_path, 0.05, side=400.0) == []
+    assert gap_warnings(tmp_path, 0.05, side=400.0) == []

@@ -42,7 +42,7 @@ def survey(tmp_path):
     return write
 
 
-def said(path, codes=None) -> list[str]:
+def warnings_of(path, codes=None) -> list[str]:
     """The warnings, which ``check`` must have as well.
 
     The surveys here are small and thin; that this is said is tested in test_density.py.
@@ -54,12 +54,12 @@ def said(path, codes=None) -> list[str]:
 
 
 def test_a_survey_with_nothing_wrong_gives_no_warning(survey):
-    assert said(survey(corridor()), "edp") == []
-    assert said(survey(corridor())) == []
+    assert warnings_of(survey(corridor()), "edp") == []
+    assert warnings_of(survey(corridor())) == []
 
 
-def test_heights_in_centimetres_are_said(survey):
-    (text,) = said(survey(corridor() * [1, 1, 100]))
+def test_heights_in_centimetres_are_reported(survey):
+    (text,) = warnings_of(survey(corridor() * [1, 1, 100]))
     assert "z does not look like metres" in text
     assert "in 25 of 26 places" in text
 
@@ -67,19 +67,19 @@ def test_heights_in_centimetres_are_said(survey):
 def test_a_steep_forest_is_not_taken_for_centimetres(survey):
     xyz = corridor()
     xyz[:, 2] += 2 * (xyz[:, 0] - 545_000) + np.random.default_rng(0).uniform(0, 45, len(xyz))
-    assert said(survey(xyz)) == []
+    assert warnings_of(survey(xyz)) == []
 
 
-def test_a_survey_in_centimetres_on_all_axes_is_said(survey):
+def test_a_survey_in_centimetres_on_all_axes_is_reported(survey):
     xyz = (corridor() - PLACE) * 100
-    assert any("points per m2, too few" in text for text in said(survey(xyz, crs=None)))
+    assert any("points per m2, too few" in text for text in warnings_of(survey(xyz, crs=None)))
 
 
 @pytest.mark.parametrize("name", ["survey.npy", "survey.laz"])
-def test_coordinates_that_went_through_float32_are_said(survey, name):
+def test_coordinates_that_went_through_float32_are_reported(survey, name):
     xyz = corridor().astype(np.float32)
     xyz = xyz if name.endswith("npy") else xyz.astype(np.float64)
-    (text,) = [text for text in said(survey(xyz, name=name)) if "float32" in text]
+    (text,) = [text for text in warnings_of(survey(xyz, name=name)) if "float32" in text]
     assert "y in steps of 0.5 at 4633850" in text
     assert "x in steps of 0.0625 at 545050" in text
 
@@ -88,16 +88,16 @@ def test_coordinates_that_went_through_float32_are_said(survey, name):
 def test_a_regular_raster_is_not_taken_for_float32(survey, step):
     x, y = np.meshgrid(np.arange(0, 50, step), np.arange(0, 50, step))
     xyz = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)]) + PLACE + 0.5
-    assert said(survey(xyz, np.full(len(xyz), 2, np.uint8))) == []
+    assert warnings_of(survey(xyz, np.full(len(xyz), 2, np.uint8))) == []
 
 
 def test_float32_close_to_zero_is_fine(survey):
     xyz = (corridor() - [545_000, 4_633_800, 0]).astype(np.float32)
-    assert not any("float32" in text for text in said(survey(xyz, name="survey.npy")))
+    assert not any("float32" in text for text in warnings_of(survey(xyz, name="survey.npy")))
 
 
-def test_coarse_steps_are_said(survey):
-    assert any("steps of 0.5 x 0.5 x 0.5" in t for t in said(survey(corridor(), scale=0.5)))
+def test_coarse_steps_are_reported(survey):
+    assert any("steps of 0.5 x 0.5 x 0.5" in t for t in warnings_of(survey(corridor(), scale=0.5)))
 
 
 def moved_to(epsg: int) -> np.ndarray:
@@ -109,8 +109,8 @@ def moved_to(epsg: int) -> np.ndarray:
 @pytest.mark.parametrize(
     ("epsg", "factor"), [(3857, "1.34"), (3395, "1.34"), (32629, None), (3763, None), (25829, None)]
 )
-def test_maps_that_stretch_lengths_are_said(survey, epsg, factor):
-    texts = said(survey(moved_to(epsg), crs=pyproj.CRS(epsg)))
+def test_maps_that_stretch_lengths_are_reported(survey, epsg, factor):
+    texts = warnings_of(survey(moved_to(epsg), crs=pyproj.CRS(epsg)))
     if factor is None:
         assert texts == []
     else:
@@ -119,13 +119,13 @@ def test_maps_that_stretch_lengths_are_said(survey, epsg, factor):
 
 def test_the_scale_of_a_compound_system_is_looked_at_as_well(survey):
     crs = pyproj.CRS("EPSG:3857+5773")
-    assert "1.34 m on the map" in said(survey(moved_to(3857), crs=crs))[0]
+    assert "1.34 m on the map" in warnings_of(survey(moved_to(3857), crs=crs))[0]
 
 
 @pytest.mark.parametrize("wrong", [pyproj.CRS(2056), pyproj.CRS(32629)])
-def test_coordinates_outside_the_area_of_their_system_are_said(survey, wrong):
+def test_coordinates_outside_the_area_of_their_system_are_reported(survey, wrong):
     xyz = corridor()[:, [1, 0, 2]] if wrong == UTM else corridor()
-    (text,) = said(survey(np.ascontiguousarray(xyz), crs=wrong))
+    (text,) = warnings_of(survey(np.ascontiguousarray(xyz), crs=wrong))
     assert "outside the area of the coordinate system" in text
 
 
@@ -139,8 +139,8 @@ def test_stray_points_are_said_with_their_range(survey):
 
 def test_nothing_is_said_of_a_handful_of_points_but_what_is_sure(survey):
     xyz = corridor()[:5]
-    assert said(survey(xyz, EDP_CODES[:5])) == []
-    assert said(survey(np.empty((0, 3)), EDP_CODES[:0])) == ["the survey has no points"]
+    assert warnings_of(survey(xyz, EDP_CODES[:5])) == []
+    assert warnings_of(survey(np.empty((0, 3)), EDP_CODES[:0])) == ["the survey has no points"]
 
 
 # --- class codes ------------------------------------------------------------------------------
@@ -182,8 +182,8 @@ def test_every_scheme_fits_itself():
         assert misfit(scheme, counts) is None
 
 
-def test_codes_that_do_not_fit_the_scheme_are_said(survey):
-    (text,) = said(survey(corridor()), "asprs")
+def test_codes_that_do_not_fit_the_scheme_are_reported(survey):
+    (text,) = warnings_of(survey(corridor()), "asprs")
     assert "code 16 (500 points) is 'Main power line' in edp" in text
 
 
@@ -192,7 +192,7 @@ def test_the_samples_of_a_folder_are_judged_together(survey, tmp_path):
     single = xyz.astype(np.float32)
     for name, points in (("a.npy", xyz), ("b.npy", single), ("c.npy", single)):
         survey(points, name=name)
-    texts = said(tmp_path, "asprs")
+    texts = warnings_of(tmp_path, "asprs")
     assert next(text for text in texts if "float32" in text).endswith(
         "(b.npy and 1 more of 3 samples)"
     )

@@ -60,7 +60,7 @@ class Figures(Settings):
     runs: dict[str, Run]
     sources: dict[str, str] = Field(description="sources of answers, in the order of the tables")
     sentences: dict[str, list[Sentence]] = Field(description="of each page")
-    kinds: dict[str, str] = Field(description="pattern of numbers that are no measurement -> why")
+    kinds: dict[str, str] = Field(description="pattern of numbers that are not measurements -> why")
     no_measurement: dict[str, dict[str, str]] = Field(description="page -> phrase -> why")
     not_covered: dict[str, str] = Field(description="page that is not checked -> why")
 

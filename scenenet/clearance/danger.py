@@ -45,7 +45,7 @@ def divided(xyz: np.ndarray, distance: np.ndarray, few: int) -> list[np.ndarray]
     """Rows (m,) of the parts of a place, each around its nearest point, the nearest part first.
 
     A part reaches ``REACH_M`` in plan around its nearest point. Fewer than ``few`` points beyond
-    the parts are no part; they belong to the one next to them.
+    the parts make no part; they belong to the one next to them.
 
     Args:
         xyz: (n, 3) m, of the points.

@@ -13,7 +13,7 @@ def read_limits(path: Path) -> tuple[ClearanceLimits, ...]:
     """The rows of a table of limits, by voltage.
 
     Raises:
-        InputError: the file cannot be read, lacks a column, or a value is no limit.
+        InputError: the file cannot be read, lacks a column, or a value is not a limit.
     """
     found: dict[float, ClearanceLimits] = {}
     for place, limits in read_rows(path, ClearanceLimits, "kV and m"):

@@ -37,7 +37,7 @@ class Area:
 
     Attributes:
         frame: of the span.
-        first, last: m along it; the last is no part of it.
+        first, last: m along it; the last is not part of it.
         half_width: m to either side.
     """
 
@@ -124,7 +124,7 @@ def measure(
     Args:
         area: the section.
         conductors: of the span, where it is measured from.
-        flown: of this and other spans, that may be near, as flown; their points are no obstacles.
+        flown: of this and other spans, that may be near, as flown; their points are not obstacles.
         points: of the survey.
         scheme: of their class codes; None where heights say what they are.
         limits: for the voltage; None without one.

@@ -1,7 +1,7 @@
 """Wires of a span that were not traced, among the points that a model takes for wires.
 
-They are no obstacles. A twig beside a conductor and the jib of a crane are, though a model may take
-them for wires too. A wire runs along the whole span, and they do not.
+They are not obstacles. A twig beside a conductor and the jib of a crane are, though a model may
+take them for wires too. A wire runs along the whole span, and they do not.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ class LabelledFiles:
         parts: part of each crop by its id; empty without a split or with a single crop.
         surveys: the surveys and TS40K samples, those without a crop included.
         read: the files that could be read.
-        skipped: files or samples without a crop, and labelled points that are no tower, with the
+        skipped: files or samples without a crop, and labelled points that are not tower, with the
             reason.
         warnings: what looks wrong about the files, as sentences that begin with the path.
         clouds: the points of each crop by its id, in the folder that they were written to.

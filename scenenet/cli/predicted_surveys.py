@@ -29,7 +29,7 @@ def replaceable_codes(classify: bool, text: str | None) -> tuple[int, ...] | Non
     """The class codes of ``--classify-from``; None for every code.
 
     Raises:
-        typer.BadParameter: these are no class codes, or nothing is classified.
+        typer.BadParameter: these are not class codes, or nothing is classified.
     """
     if text is None:
         return None

@@ -24,7 +24,7 @@ from scenenet.models.settings import ModelSettings
 HEAD = """\
 # Settings
 
-`config.yaml` is read on every run. A file given with `--configfile` is laid over it: mappings are
+`config.yaml` is read on every run. A file given with `--configfile` overrides it: mappings are
 merged key by key, lists are replaced. `--config KEY=VALUE` is applied last. A setting that is not
 given has the default below. `RESULTS_DIR/config.yaml` has all settings of a run.
 

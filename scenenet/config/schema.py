@@ -191,7 +191,7 @@ class Config(Settings):
         only = names if self.only_studies is None else self.only_studies
         if unknown := [name for name in only if name not in names]:
             raise ValueError(
-                f"only_studies: {', '.join(unknown)} is none of the studies: {', '.join(names)}"
+                f"only_studies: {', '.join(unknown)} is not one of the studies: {', '.join(names)}"
             )
         chosen = tuple(
             study.model_copy(update={"seeds": study.seeds[: self.study_seeds]})

@@ -156,7 +156,7 @@ def _check_header(header: list[str], file: str) -> None:
 
 
 def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey | None, list[str]]:
-    """The survey of a row, or None if a cell is missing or is no path, and the problems of the
+    """The survey of a row, or None if a cell is missing or is not a path, and the problems of the
     row."""
     problems = [f"{name} is empty" for name in NEEDED if not row.get(name)]
     if problems:
@@ -210,7 +210,7 @@ def _unknown(column: str, value: str, known: tuple[str, ...]) -> list[str]:
         return []
     close = difflib.get_close_matches(value.lower(), known, n=1)
     hint = f", did you mean {close[0]!r}?" if close else ""
-    return [f"{column} {value!r} is none of {', '.join(known)}{hint}"]
+    return [f"{column} {value!r} is not one of {', '.join(known)}{hint}"]
 
 
 def _path_problems(path: str, written: str, role: str, root: Path, config: Config) -> list[str]:
@@ -227,7 +227,7 @@ def _path_problems(path: str, written: str, role: str, root: Path, config: Confi
     if where.is_file():
         if where.suffix.lower() in SURVEY_SUFFIXES:
             return []
-        return [f"{path} is none of {', '.join(SURVEY_SUFFIXES)}"]
+        return [f"{path} is not one of {', '.join(SURVEY_SUFFIXES)}"]
     if written.startswith(RESULTS) or where.parent.name == "synthetic":
         names = [survey.name for survey in config.synthetic.surveys]
         close = difflib.get_close_matches(where.stem, names, n=1)

@@ -12,7 +12,7 @@ def load_without_data_frames() -> None:
     """Import pyogrio as where pandas, pyarrow and geopandas are not installed.
 
     The package reads and writes arrays. In a short command the import of pandas takes longer than
-    to write all layers. For a process of which nobody else uses pyogrio: its data frames stay
+    to write all layers. For a process in which no other code uses pyogrio: its data frames stay
     unusable there. Nothing changes where it is loaded already.
     """
     if "pyogrio" in sys.modules:

@@ -21,7 +21,7 @@ m to the next tower along the line, NaN for the last."""
 
 LEFT_OUT_COLUMNS = ("x", "y", "points", "height", "reason")
 """x, y: centre of the points, m. points: their number. height: top minus base, m. reason: why these
-points labelled tower are no tower."""
+points labelled tower are not tower."""
 
 DIRECTION_STEP = 3.0
 """Step of the directions in which the base of a tower is measured, degrees."""
@@ -61,7 +61,7 @@ class LabelledTowers:
     Attributes:
         towers: a row per tower with ``COLUMNS``, in order along the line. TS40K samples add
             ``sample``, the name of the sample, and have spacing NaN, because they are single crops.
-        left_out: a row per group of points labelled tower that is no tower, with
+        left_out: a row per group of points labelled tower that is not a tower, with
             ``LEFT_OUT_COLUMNS``, and ``sample`` as above.
     """
 
@@ -127,9 +127,9 @@ class Groups:
 
     Attributes:
         tower: (N,) int, the tower of each point from 0; -1 for none.
-        left_out: (N,) int, the group of each point that is no tower from 0; -1 for points of a
+        left_out: (N,) int, the group of each point that is not a tower from 0; -1 for points of a
             tower.
-        reasons: of each group of ``left_out``, why it is no tower.
+        reasons: of each group of ``left_out``, why it is not a tower.
     """
 
     tower: np.ndarray
@@ -166,7 +166,7 @@ def cluster(xyz: np.ndarray, settings: TowerSettings) -> Groups:
 
 
 def _why_no_tower(xyz: np.ndarray, dense: np.ndarray, settings: TowerSettings) -> str | None:
-    """Why a group (n, 3) of few points is no tower; None if it is one.
+    """Why a group (n, 3) of few points is not a tower; None if it is one.
 
     Args:
         dense: (N, 3) points of the towers with ``min_points``.

@@ -1,6 +1,6 @@
 """Where labelled or true towers stand: position, ground under the axis, and height above it.
 
-The lowest labelled point is no foot: annotators label scrub and ground around a tower, and scrub
+The lowest labelled point is not a foot: annotators label scrub and ground around a tower, and scrub
 hides the lowest metre of it. The ground under the axis comes from the ground points around it.
 """
 

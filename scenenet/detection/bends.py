@@ -44,7 +44,7 @@ class Wire(NamedTuple):
 def pass_without_bend(spans: tuple[Span, ...], axis: np.ndarray) -> bool:
     """Whether conductors pass an axis (2,) m from one side to the other as smooth curves.
 
-    False if no conductor shows on both sides of the axis, so that it cannot be told.
+    False if no conductor shows on both sides of the axis, so that it cannot be decided.
     """
     pair = _opposite(spans)
     if pair is None:

@@ -1,5 +1,5 @@
-"""The physics of conductors: every number that tells a conductor from something else, with its
-unit and its reason.
+"""The physics of conductors: every number that distinguishes a conductor from other objects,
+with its unit and its reason.
 
 A conductor hangs in free air. It is long, thin and nearly level, is attached to the head of a tower
 and leads to the next support. What the numbers do is described in docs/method/detection.md.

@@ -136,7 +136,7 @@ def find_head(
     member &= _with_neighbours(inside) > FREE * _with_neighbours(outside)
     middle = left + (np.arange(wide) + 0.5) * CELL_M
     body = np.zeros((wide, tall), bool)
-    # Nothing above it is connected with the body through the air: a bird is no peak.
+    # Nothing above it is connected with the body through the air: a bird is not a peak.
     body[np.abs(np.abs(middle) - apart) <= half + CELL_M, :known] = True
     arm = _connected(member, body, below)
     return Head(_with_legs(member, arm, np.abs(middle), apart, below), left, fork, thick)

@@ -25,7 +25,7 @@ from scenenet.detection.profile import GAP_M, SCRUB_M, SHIFT_M, Profile, fit_pro
 from scenenet.detection.structure import MARGIN_M, BodyTests, Structure
 
 FOOT_M = 0.5
-"""m above the ground below which grass and scrub cannot be told from the foot of a tower."""
+"""m above the ground below which the foot of a tower looks like grass and scrub."""
 
 SCRUB_TOP_M, SCRUB_TOP = 3.0, 0.15
 """Height of the highest scrub around a foot: m, and as a share of the height of the body. Below a

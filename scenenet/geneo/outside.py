@@ -44,17 +44,17 @@ def _fault(kernel: GeneoKernel) -> str | None:
     ):
         return "must have parameters, a tuple of ShapeParameter (one: (ShapeParameter(...),))"
     if not isinstance(kernel.turns, int) or kernel.turns < 1:
-        return f"has turns = {kernel.turns!r}, which is no number of turns about z"
+        return f"has turns = {kernel.turns!r}, which is not a number of turns about z"
     names = [parameter.name for parameter in parameters]
     if len(set(names)) < len(names):
         return f"has two parameters of one name among {', '.join(names)}"
     for parameter in parameters:
         if parameter.unit not in _UNITS:
-            return f"has {parameter.name} in {parameter.unit!r}, which is none of {_UNITS}"
+            return f"has {parameter.name} in {parameter.unit!r}, which is not one of {_UNITS}"
         ranges = (parameter.metric_range, parameter.physical_range)
         for low, high in (*ranges, (parameter.low, parameter.high)):
             if not low < high:
-                return f"has {parameter.name} from {low:g} to {high:g}, which is no range"
+                return f"has {parameter.name} from {low:g} to {high:g}, which is not a range"
         if min(low for low, _ in ranges) <= 0:
             return f"has {parameter.name} with a bound that is not positive"
     return _fault_of_values(kernel)

@@ -9,10 +9,10 @@ On a scene they are not, because points change voxels; the certificate says by h
 **Non-expansivity.** The constant of an orbit is the largest ||g||_1 of its kernels, that of a
 convex combination is at most the combination of the constants, and that of a composition at most
 their product. The largest constant that was measured, between random measurements in [0, 1] and
-small changes of them, stands beside this bound and never exceeds it.
+small changes of them, is compared with this bound and never exceeds it.
 
 **Convexity.** The mixing weights of each observer sum to one and none is negative. A maximum or a
-product of operators is no convex combination; what bounds its constant is in
+product of operators is not a convex combination; what bounds its constant is in
 ``scenenet.models.mixing``.
 """
 

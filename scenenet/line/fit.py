@@ -29,7 +29,7 @@ RAYLEIGH_MEDIAN = 1.177
 
 ITERATIONS, PLAIN, WIDE, CHANGE = 20, 2, 5, 1e-3
 """Iterations at most, those at the start without weights, in which the curvature is found, those
-after which outliers are told by the full width, and change of a weight at which they end."""
+after which outliers are recognised by the full width, and change of a weight at which they end."""
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ WINDOW_M, SHORTEST_WINDOW_M, WINDOWS = 12.0, 4.0, 4
 wires pieces are shorter, so that it has so many, but not shorter than the second number."""
 
 APART_M = 0.5
-"""m, least distance between two wires that are told apart. Subconductors of a bundle are 0.3 to
+"""m, least distance of two wires that are distinguished. Subconductors of a bundle are 0.3 to
 0.5 m apart, conductors 0.8 m or more."""
 
 STEEPEST = 0.5
@@ -25,7 +25,7 @@ MIN_SHARE = 0.3
 """Points of a piece, and share of the window that they reach over, at least."""
 
 SEEN_M = 0.05
-"""m, to which positions are rounded where wires are told apart."""
+"""m, to which positions are rounded to distinguish wires."""
 
 SAMPLE, HASHED = 400, 4096
 """Points of a window that its slope is found from, at most, and cells that they are counted in."""

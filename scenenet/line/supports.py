@@ -1,6 +1,6 @@
 """Towers as the line shows them: at how many heights they hold conductors, and what stands there.
 
-The arrangement of the conductors tells the types of towers apart that a list of places does not:
+The arrangement of the conductors distinguishes types of towers that a list of places does not:
 one level is a horizontal arrangement, such as that of a portal or a window tower, two levels of one
 and two conductors are a triangle, three levels of two are a double circuit.
 """

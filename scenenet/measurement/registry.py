@@ -73,7 +73,7 @@ def _unknown(name: str) -> str:
     names = measurement_names()
     close = difflib.get_close_matches(name, names, n=1)
     hint = f"; did you mean {close[0]!r}?" if close else ""
-    return f"{name!r} is none of the measurements {', '.join(names)}{hint}"
+    return f"{name!r} is not one of the measurements {', '.join(names)}{hint}"
 
 
 def _known(name: str) -> str:

@@ -39,7 +39,7 @@ FORMAT = "scenenet-model"
 FORMAT_VERSION = 1
 COMPOSED_VERSION = 5
 """Version of the file of a SCENE-Net in metres that is not one kernel: it has kernels with a
-direction or a first observer, is no sum of kernels, or observes blocks of another size."""
+direction or a first observer, is not a sum of kernels, or observes blocks of another size."""
 METRIC_VERSION = 4
 """Version of the file of every other SCENE-Net in metres."""
 SEARCHED_VERSION = 3
@@ -357,7 +357,7 @@ def _require_measurement(data: Mapping[str, Any]) -> None:
     if name not in MEASUREMENTS.known():
         known = ", ".join(sorted(MEASUREMENTS.built_in()))
         raise InputError(
-            f"its measurement {name!r} is none of {known}",
+            f"its measurement {name!r} is not one of {known}",
             remedy="Use the version of scenenet that wrote it",
         )
 

@@ -63,7 +63,7 @@ def _known_kernel(name: str) -> str:
     if name not in known:
         close = difflib.get_close_matches(name, sorted(known), n=1)
         hint = f"did you mean {close[0]!r}?" if close else "provide the file of another kernel"
-        raise ValueError(f"{name!r} is none of the kernels {', '.join(sorted(known))}; {hint}")
+        raise ValueError(f"{name!r} is not one of the kernels {', '.join(sorted(known))}; {hint}")
     return name
 
 
@@ -158,8 +158,8 @@ class SearchSettings(Settings):
         0.02,
         ge=0,
         description="middle: loss of score up to which an initial point counts as hardly lower; "
-        "null for one standard error of the difference between the crops, where crops of several "
-        "lines tell it (docs/method/decisions.md)",
+        "null for one standard error of the difference between the crops, which needs crops of "
+        "several lines (docs/method/decisions.md)",
     )
     near_best: float = Field(
         0.0,

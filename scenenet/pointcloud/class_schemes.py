@@ -25,7 +25,7 @@ from scenenet.core.errors import InputError
 Role = Literal[
     "tower", "conductor", "fitting", "vegetation", "ground", "building", "noise", "other"
 ]
-"""What a class is to the method. ``fitting`` are insulators, and cables that are no conductors;
+"""What a class is to the method. ``fitting`` are insulators, and cables that are not conductors;
 ``ground`` includes surfaces on it; ``noise`` are the points that the producer marked as noise."""
 
 Look = Literal["ground", "low", "tall", "stray", "other", "conductor", "tower"]

@@ -154,7 +154,7 @@ def survey_of_lengths(path: str | Path, crs: pyproj.CRS | None = None) -> Survey
         crs: as ``survey_info``.
 
     Raises:
-        InputError: as ``survey_info``, and if the coordinates are no lengths.
+        InputError: as ``survey_info``, and if the coordinates are not lengths.
     """
     info = survey_info(path, crs)
     if (reason := info.not_metres) and not reason.is_length:

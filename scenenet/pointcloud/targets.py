@@ -131,7 +131,7 @@ def _codes(listed: str, text: str) -> tuple[int, ...]:
     parts = [part.strip() for part in listed.split(",")]
     if not all(part.isdecimal() and int(part) < 256 for part in parts):
         raise InputError(
-            f"{text!r} is no list of class codes from 0 to 255",
+            f"{text!r} is not a list of class codes from 0 to 255",
             remedy="Write them with commas, such as 14,16 or lamp=14",
         )
     return tuple(sorted(set(map(int, parts))))

@@ -26,7 +26,7 @@ def find_clearances_in_survey(
     Args:
         spool: the points of all its files.
         line: its lines.
-        structures: the shapes of its towers; their points are no obstacles.
+        structures: the shapes of its towers; their points are not obstacles.
         wires: where the model of wires found them. Points there are no obstacles if they are at a
             tower or run along the span: they are of jumpers, or of conductors that were not traced.
         scheme: of the class codes, which ``spool`` then keeps; None where the height above ground

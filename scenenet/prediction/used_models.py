@@ -100,7 +100,7 @@ def code_of_target(target: Target, scheme: ClassScheme | None) -> int | None:
 
 
 def _require_different(models: Iterable[UsedModel]) -> None:
-    """Refuse models whose results could not be told apart.
+    """Refuse models whose results could not be distinguished.
 
     Raises:
         InputError: as ``use_models``.

@@ -1,4 +1,4 @@
-"""The page of ``scenenet geneo try``: what a kernel answers to in a survey."""
+"""The page of ``scenenet geneo try``: what a kernel responds to in a survey."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def write_trial_page(trial: Trial, out: str | Path) -> None:
         sections = [Section("answers", f"{trial.kernel} on {Path(trial.survey).name}", blocks)]
         for number, place in enumerate(trial.places[:PICTURES], start=1):
             sections.append(_place(trial, number, place, scratch))
-        title = f"What the kernel {trial.kernel} answers to"
+        title = f"What the kernel {trial.kernel} responds to"
         write_text(out, render(sections, title, GENERATOR))
 
 
@@ -91,7 +91,7 @@ def _map(trial: Trial, scratch: Path) -> Picture:
         "The survey from above, coloured by the response; the numbers are the places with the "
         "highest responses. x and y begin at the lowest coordinates."
     )
-    return Picture(file, "Map of the answers", alt, caption, "answers")
+    return Picture(file, "Map of the responses", alt, caption, "answers")
 
 
 def _place(trial: Trial, number: int, place: Place, scratch: Path) -> Section:

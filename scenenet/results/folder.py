@@ -245,7 +245,7 @@ class Results:
         )
 
     def review_counts(self, survey: str) -> Mapping[str, int] | None:
-        """Number of towers of a survey with each decision; None if nobody reviewed it."""
+        """Number of towers of a survey with each decision; None without a review."""
         record = self._if_there("review", f"{survey}/{survey}.reviewed.json")
         return None if record is None else record["counts"]
 

@@ -153,14 +153,14 @@ class _Columns:
         """What a row says, with its place as it is in the file; None if it says nothing.
 
         Raises:
-            InputError: the decision is not known, or a cell is no number.
+            InputError: the decision is not known, or a cell is not a number.
         """
         word, comment = row.text(self.decision).lower(), row.text(self.comment)
         if not word and not comment:
             return None
         if word and word not in _WORDS:
             raise row.error(
-                f"{row.text(self.decision)!r} is no decision",
+                f"{row.text(self.decision)!r} is not a decision",
                 f"Write {', '.join(DECISIONS)}, or leave the cell empty",
             )
         return Said(

@@ -145,12 +145,12 @@ def _columns(table: Table) -> dict[str, type]:
     """The columns of a list with the types of their values.
 
     Raises:
-        InputError: it is no tower list.
+        InputError: it is not a tower list.
     """
     missing = [name for name in ("id", "x", "y") if name not in table.columns]
     if missing:
         raise table.error(
-            f"this is no tower list: it has no column {', '.join(missing)}",
+            f"this is not a tower list: it has no column {', '.join(missing)}",
             "Name the list that scenenet predict wrote",
         )
     geneos = [c.removeprefix(CONTRIBUTION) for c in table.columns if c.startswith(CONTRIBUTION)]
@@ -162,7 +162,7 @@ def _tower(row: Row, columns: Mapping[str, type]) -> ListedTower:
     """The tower in a row.
 
     Raises:
-        InputError: a value is no number, or there is no id or place.
+        InputError: a value is not a number, or there is no id or place.
     """
     values: dict[str, Any] = {}
     for name, kind in columns.items():

@@ -97,7 +97,7 @@ class PlaceColumns:
         """The coordinates in a row; None where it has none.
 
         Raises:
-            InputError: only one is there, or one is no number.
+            InputError: only one is there, or one is not a number.
         """
         if self.x is None:
             return row.point
@@ -143,7 +143,7 @@ def in_survey(
         return xy
     if crs.is_geographic:
         wrong = (np.abs(xy) > [180.0, 90.0]).any(axis=1)
-        _refuse(rows, xy, wrong, "it is no longitude and latitude in degrees")
+        _refuse(rows, xy, wrong, "it is not a longitude and latitude in degrees")
     moved = np.column_stack(_conversion(crs.to_2d(), plain).transform(*xy.T))
     _refuse(rows, xy, ~np.isfinite(moved).all(axis=1), f"it is outside of {plain.name}")
     return moved

@@ -1,6 +1,6 @@
 """Cross entropy instead of the squared error (thesis 5.3.3), from the observer's response H(x).
 
-With p = (tanh H)_+, a voxel costs -log(1 - p) if it is no tower voxel and -log p if it is one.
+With p = (tanh H)_+, a voxel costs -log(1 - p) if it is not a tower voxel and -log p if it is one.
 
 - **No tower**: -log(1 - tanh h) = softplus(2 h) - log 2, computed from h = (H)_+ and not from p,
   which is 1 in float32 from h = 9 on. A wrong response costs about 2 h, and its slope 1 + p never

@@ -109,7 +109,7 @@ def _changed(values: Mapping[str, float], label: str, value: float) -> dict[str,
         own = [n for n in values if n.startswith(f"{prefix}lambda.") and n != label]
         others = 1 - values[label]
         for other in own:
-            # Next to nothing is left for the others: their ratios are rounding.
+            # Almost nothing is left for the others: their ratios are rounding.
             few = others < NOTHING
             changed[other] = (1 - value) / len(own) if few else values[other] * (1 - value) / others
     changed[label] = value

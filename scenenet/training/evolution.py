@@ -31,7 +31,7 @@ class State:
         scores: (G, K) score of each of the K draws of the G generations so far.
         best: (P,) the best draw so far, and ``best_score``, its score.
         live: the library's search, which moves on with each generation; None after a restart. It
-            is no part of the state, which follows from the seed and the scores.
+            is not part of the state, which follows from the seed and the scores.
     """
 
     first: np.ndarray

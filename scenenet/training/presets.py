@@ -44,7 +44,7 @@ OBSERVERS: Mapping[str, Mapping[str, Any]] = {
             "observed": 0.5,
             "false_weight": ELSEWHERE * OF_INTERSECTION,
             "whole_towers": False,
-            # The strongest response within a metre: insulators and jumpers are no straight lines.
+            # The strongest response within a metre: insulators and jumpers are not straight lines.
             "section_radius": 1.0,
             "section_above": 0.0,
         },

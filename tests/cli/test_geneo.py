@@ -22,7 +22,7 @@ def test_the_list_has_every_kernel_with_its_parameters_and_its_origin(call, tmp_
     kernels = {kernel["name"]: kernel for kernel in json.loads(shown.out)}
     assert {"cylinder", "arrow", "negative_sphere", "lamp"} <= kernels.keys()
     assert kernels["cylinder"]["origin"] == "built in"
-    assert kernels["cylinder"]["answers_to"].startswith("The body of a tower")
+    assert kernels["cylinder"]["responds_to"].startswith("The body of a tower")
     assert kernels["lamp"]["origin"] == str(tmp_path / "lamp.py")
     assert kernels["lamp"]["parameters"][0] | {"value": 0, "sentence": ""} == {
         "name": "r", "unit": "m", "low": 0.1, "high": 1.5, "meaning": "radius of the column",
@@ -125,7 +125,7 @@ def test_what_cannot_be_shown_is_said(call, arguments, code, message):
     assert "Traceback" not in shown.err
 
 
-def test_a_trial_says_what_a_kernel_answers_to_by_class_and_where(call, pole_survey):
+def test_a_trial_says_what_a_kernel_responds_to_by_class_and_where(call, pole_survey):
     trial = ("geneo", "try", "cylinder", pole_survey, "--codes", "edp", "--set", "r=0.3")
     found = json.loads(call(*trial, "--json").out)
     classes = {entry["code"]: entry for entry in found["classes"]}
@@ -174,7 +174,7 @@ def test_the_page_of_a_trial_replaces_only_a_page_of_a_trial(call, pole_survey, 
     assert call(*trial).code == 0
     assert call(*trial).code == 0
     text = page.read_text()
-    assert "What the kernel cylinder answers to" in text
+    assert "What the kernel cylinder responds to" in text
     assert text.count("data:image/png") >= 2
     page.write_text("mine")
     assert call(*trial).code == 1

@@ -100,7 +100,7 @@ def test_what_is_missing_is_said(files, model, tmp_path, call, monkeypatch):
     assert failed.code == 1 and "bright.py is another one" in failed.err
     wrong = call("train", files / "a.laz", "--codes", "asprs", "--measurement", "brigth", "--out",
                  tmp_path / "m.json")  # fmt: skip
-    assert wrong.code == 2 and "is none of the measurements" in wrong.err
+    assert wrong.code == 2 and "is not one of the measurements" in wrong.err
 
 
 @pytest.mark.parametrize("measurement", ["last_returns", "height"])

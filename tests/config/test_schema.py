@@ -95,7 +95,7 @@ def test_only_the_named_studies_are_run():
     assert [study.name for study in config.studies] == ["first", "third"]
     # The resolved settings are a configuration of the same run.
     assert load(config.plain()).studies == config.studies
-    with pytest.raises(InputError, match="only_studies: fourth is none of the studies: first"):
+    with pytest.raises(InputError, match="only_studies: fourth is not one of the studies: first"):
         load(raw(studies=defined, only_studies=["fourth"]))
 
 
@@ -298,7 +298,7 @@ def test_an_unknown_kernel_is_refused_with_the_nearest_name():
     model = {"name": "m", "kind": "scenenet", "geneos": ["arrow", "cylindre"]}
     message = complaint(models=[model])
     assert (
-        "models[0].geneos[1]: 'cylindre' is none of the kernels arrow, blob, canopy, cylinder"
+        "models[0].geneos[1]: 'cylindre' is not one of the kernels arrow, blob, canopy, cylinder"
         in message
     )
     assert "did you mean 'cylinder'?" in message
@@ -318,7 +318,7 @@ def test_the_kernels_of_the_settings_are_those_of_the_registry():
     )
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     message, names = shown.stdout.splitlines()
-    shown = f"Value error, 'none' is none of the kernels {names}; "
+    shown = f"Value error, 'none' is not one of the kernels {names}; "
     assert message == f"{shown}provide the file of another kernel"
 
 

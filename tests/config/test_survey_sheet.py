@@ -130,10 +130,10 @@ def test_an_absolute_path_is_not_changed(root):
     [
         ("north\tdata/nort.laz\tedp\ttrain", "did you mean data/north.laz?"),
         ("north\tdatta/north.laz\tedp\ttrain", "nor is its folder"),
-        ("north\tdata/north.laz\tepd\ttrain", "codes 'epd' is none of edp, asprs, ts40k, did"),
+        ("north\tdata/north.laz\tepd\ttrain", "codes 'epd' is not one of edp, asprs, ts40k, did"),
         (
             "north\tdata/north.laz\tedp\ttraining",
-            "role 'training' is none of train, observe, new, did you",
+            "role 'training' is not one of train, observe, new, did you",
         ),
         ("no rth/1\tdata/north.laz\tedp\ttrain", "such as 'no_rth_1'"),
         ("\tdata/north.laz\tedp\ttrain", "survey is empty"),
@@ -149,7 +149,7 @@ def test_an_absolute_path_is_not_changed(root):
         ),
         ("north\tdata/*.xyz\tedp\tnew", "data/*.xyz: there is no LAS or LAZ file in it"),
         ("north\tbad.vpc\tedp\tnew", "bad.vpc: this is not a tile index: no item in it has assets"),
-        ("north\tsurveys.tsv\tedp\ttrain", "surveys.tsv is none of .las, .laz, .npy, .pt"),
+        ("north\tsurveys.tsv\tedp\ttrain", "surveys.tsv is not one of .las, .laz, .npy, .pt"),
         ("north\tts40k\tedp\tnew", "is a folder; samples in a folder can only be trained on"),
         ("x\t{results_dir}/synthetic/mode.laz\tedp\ttrain", "{results_dir}/synthetic/made.laz?"),
     ],

@@ -82,7 +82,7 @@ def test_the_kernel_answers_most_to_lamps_before_training(reader):
     shown = reader.output("scenenet geneo try")
     table = shown.partition("positive   highest\n")[2].splitlines()
     assert table[0].startswith("19 Overhead structure")
-    places = shown.partition("highest answers")[2].splitlines()[1:5]
+    places = shown.partition("highest responses")[2].splitlines()[1:5]
     assert all(place.endswith("19 Overhead structure") for place in places), shown
     assert (reader.folder / "lamp.html").read_text().count("data:image/png") == 5
 

@@ -47,7 +47,7 @@ def test_the_variable_names_files_and_folders(ring, tmp_path, monkeypatch):
     folder = tmp_path / "more"
     folder.mkdir()
     (folder / "halo.py").write_text(RING.replace('"ring"', '"halo"'))
-    (folder / "test_halo.py").write_text("raise AssertionError('a test is no kernel')")
+    (folder / "test_halo.py").write_text("raise AssertionError('a test is not a kernel')")
     monkeypatch.setenv(KERNELS.variable, f"{ring}{os.pathsep}{folder}")
     assert set(KERNELS.provided()) == {"ring", "halo"}
     assert kernel_named("halo").name == "halo"
@@ -75,8 +75,8 @@ def test_the_names_of_kernels_are_known_without_running_them_and_without_torch(t
         ("import sys\nsys.exit(3)\n", r"ring\.py: line 2: .*SystemExit: 3"),
         (RING.replace('"ring"', '"other"'), r"registers 'other', and a kernel has the name of its"),
         (RING + RING.replace('"ring"', '"second"'), "registers 'ring', 'second'"),
-        (RING.replace('"voxel"', '"foot"'), "has r in 'foot', which is none of"),
-        (RING.replace("0.5, 3.0", "3.0, 0.5"), "has r from 3 to 0.5, which is no range"),
+        (RING.replace('"voxel"', '"foot"'), "has r in 'foot', which is not one of"),
+        (RING.replace("0.5, 3.0", "3.0, 0.5"), "has r from 3 to 0.5, which is not a range"),
         (RING.replace(BALANCED, "ring.sum()"), r"gives \(\) for a lattice of \(7, 5, 5\)"),
         (RING.replace('shape["r"] ** 2,', 'shape["s"],'), r"line 11: .*KeyError: 's'"),
         (RING.replace(BALANCED, f'{BALANCED} * float("nan")'), "not finite for r = 1.22"),

@@ -1,4 +1,4 @@
-"""A tree beside a span is no tower if the conductors of the span go on past it."""
+"""A tree beside a span is not a tower if the conductors of the span go on past it."""
 
 from __future__ import annotations
 

@@ -12,8 +12,8 @@ from scenenet.line.wire_points import WirePoints
 
 
 def search() -> None:
-    """Points that are no wire: left and right of a tower in a stretch, and some beside its longer
-    part, which keep the stretch together."""
+    """Points that belong to no wire: left and right of a tower in a stretch, and some beside its
+    longer part, which keep the stretch together."""
     rng = np.random.default_rng(0)
     row = np.column_stack(
         (rng.uniform(0, 20, 300), rng.uniform(-1, 1, 300), rng.uniform(5, 9, 300))

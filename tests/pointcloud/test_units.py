@@ -83,8 +83,8 @@ def test_a_unit_that_is_not_the_metre_is_refused_on_every_axis(with_records, rec
         survey_in_metres(path)
     assert words in str(caught.value)
     assert str(path) in str(caught.value)
-    told = [text for text in check_survey(path).warnings if words in text]
-    assert len(told) == 1, "check says it too, and once"
+    warned = [text for text in check_survey(path).warnings if words in text]
+    assert len(warned) == 1, "check says it too, and once"
 
 
 def test_the_size_of_a_unit_of_the_users_own_is_read(with_records):

@@ -154,24 +154,24 @@ def test_a_bad_file_is_named_and_stops_no_other(uncut, model, tmp_path):
     files = predict(tiles, model, tmp_path / "out")
     assert not files.points[first].exists()
     assert all(files.points[path].exists() for path in others)
-    told = {file["file"]: file for file in json.loads(files.summary.read_text())["files"]}
-    assert told[first.name]["status"] == "failed"
-    assert first.name in told[first.name]["error"]
-    assert all(told[path.name]["status"] == "predicted" for path in others)
+    record = {file["file"]: file for file in json.loads(files.summary.read_text())["files"]}
+    assert record[first.name]["status"] == "failed"
+    assert first.name in record[first.name]["error"]
+    assert all(record[path.name]["status"] == "predicted" for path in others)
     layer = pyogrio.raw.read(files.geopackage, layer="tiles")
     status = dict(zip(layer[0]["fields"], layer[3], strict=True))
     assert list(status["file"]) == [path.name for path in sorted(tiles.iterdir())]
     assert list(status["status"]) == ["failed"] + ["predicted"] * len(others)
     with files.status.open(newline="") as stream:
         table = list(csv.DictReader(stream))
-    assert table == [{name: str(value) for name, value in told[row["file"]].items()}
+    assert table == [{name: str(value) for name, value in record[row["file"]].items()}
                      for row in table]  # fmt: skip
     assert [row["file"] for row in table] == list(status["file"])
     for path in others:
         numbers = np.asarray(laspy.read(files.points[path]).tower_id)
-        assert told[path.name]["towers"] == len(set(numbers.tolist()) - {0})
-        assert told[path.name]["tower_points"] == np.count_nonzero(numbers)
-    assert sum(told[path.name]["towers"] for path in others) > 0
+        assert record[path.name]["towers"] == len(set(numbers.tolist()) - {0})
+        assert record[path.name]["tower_points"] == np.count_nonzero(numbers)
+    assert sum(record[path.name]["towers"] for path in others) > 0
 
 
 def test_a_survey_of_one_file_has_no_status_table(uncut, tmp_path):
@@ -187,9 +187,9 @@ def test_a_file_in_another_system_is_left_out(uncut, model, tmp_path):
     )
     write_las(last, PointCloud(cloud.xyz, cloud.classification, crs=pyproj.CRS(32630)))
     files = predict(tiles, model, tmp_path / "out")
-    told = json.loads(files.summary.read_text())["files"][-1]
-    assert told["status"] == "left out"
-    assert "WGS 84 / UTM zone 30N" in told["error"] and "zone 29N" in told["error"]
+    record = json.loads(files.summary.read_text())["files"][-1]
+    assert record["status"] == "left out"
+    assert "WGS 84 / UTM zone 30N" in record["error"] and "zone 29N" in record["error"]
 
 
 def test_a_survey_with_no_good_file_is_an_error(model, tmp_path):

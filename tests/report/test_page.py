@@ -227,7 +227,7 @@ def test_claims_open_the_page_only_where_the_run_tells_one(page, results: Result
     assert told_none[0] == "overview"
     assert told_none.count("claims") == 1
     assert told_none.index("claims") > told_none.index("models")
-    assert "This run tells none of the 2 claims" in read(page).text
+    assert "This run decides none of the 2 claims" in read(page).text
 
 
 def test_a_survey_without_towers_says_so(page: Path, results: Results, thesis: Thesis):

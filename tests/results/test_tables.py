@@ -122,16 +122,16 @@ def test_position_errors_are_those_of_seeds_that_hit_something(results: Results,
 def test_scores_against_the_truth_have_columns_of_their_own(results: Results, thesis: Thesis):
     """The truth is known for one of two seeds of one model, and nothing is tower in it twice."""
     path = results.folder / "evaluate" / "scenenet" / "seed-1.json"
-    told = json.loads(path.read_text())
+    record = json.loads(path.read_text())
     points = {"precision": 0.5, "recall": None, "iou": 0.25, "n_true": 0, "n_predicted": 9}
-    truth = {name: told[name] for name in Scores.__dataclass_fields__}
+    truth = {name: record[name] for name in Scores.__dataclass_fields__}
     truth |= {
-        "voxel": told["voxel"] | {"f05": 0.125},
-        "towers": told["towers"] | {"median_base_error_m": 2.5},
+        "voxel": record["voxel"] | {"f05": 0.125},
+        "towers": record["towers"] | {"median_base_error_m": 2.5},
         "points": points,
     }
-    told |= {"truth": truth, "labels_against_truth": points | {"precision": 0.75}}
-    path.write_text(json.dumps(told))
+    record |= {"truth": truth, "labels_against_truth": points | {"precision": 0.75}}
+    path.write_text(json.dumps(record))
     fresh = replace(results)
     found = tables.models(fresh, thesis)
     assert row(found, model="scenenet", counted="all seeds")["truth_f05"] == 0.125
@@ -326,9 +326,9 @@ def test_two_runs_that_differ_in_their_times_have_the_same_digest_of_scores(
         table = pd.read_csv(history)
         table.assign(seconds=3 * table["seconds"]).to_csv(history, index=False)
     for times in results.folder.glob("inference_time/*.json"):
-        told = json.loads(times.read_text())
-        told["inference_ms"] = {size: 3 * ms for size, ms in told["inference_ms"].items()}
-        times.write_text(json.dumps(told))
+        record = json.loads(times.read_text())
+        record["inference_ms"] = {size: 3 * ms for size, ms in record["inference_ms"].items()}
+        times.write_text(json.dumps(record))
     assert digest_of("slower") == first
     slower, before = (tmp_path / name / "times.csv" for name in ("slower", "first"))
     assert slower.read_bytes() != before.read_bytes()
@@ -336,9 +336,9 @@ def test_two_runs_that_differ_in_their_times_have_the_same_digest_of_scores(
     timed = {"times", "seed_times", "claims_times", "published_numbers_times"}
     assert not timed & set(first["tables"])
     evaluation = results.folder / "evaluate" / "cnn" / "seed-0.json"
-    told = json.loads(evaluation.read_text())
-    told["voxel"]["precision"] += 0.01
-    evaluation.write_text(json.dumps(told))
+    record = json.loads(evaluation.read_text())
+    record["voxel"]["precision"] += 0.01
+    evaluation.write_text(json.dumps(record))
     assert digest_of("better")["digest"] != first["digest"]
 
 
@@ -348,12 +348,12 @@ def test_a_score_that_is_not_defined_is_empty_in_every_table_and_no_zero(
     """As for crops without a labelled tower in which none is found."""
     nothing = dict.fromkeys(SCORES)
     for path in results.folder.glob("evaluate/*/*.json"):
-        told = json.loads(path.read_text())
-        for part in [name for name in told if name.startswith("voxel")]:
-            told[part] |= nothing
-        told["towers"] |= {"precision": None, "recall": None, "n_true": 0, "n_predicted": 0}
-        told["average_precision"] = None
-        path.write_text(json.dumps(told))
+        record = json.loads(path.read_text())
+        for part in [name for name in record if name.startswith("voxel")]:
+            record[part] |= nothing
+        record["towers"] |= {"precision": None, "recall": None, "n_true": 0, "n_predicted": 0}
+        record["average_precision"] = None
+        path.write_text(json.dumps(record))
     fresh = replace(results)
     tables.write_tables(fresh, thesis, tmp_path)
     for name, columns in {

@@ -175,7 +175,7 @@ def test_points_that_cannot_be_labelled_are_named(call, found, review, scene, po
     predict = ("predict", survey, "--model", pole_model, "--out", out, "--min-conductor", 0)
     assert call(*predict, "--classify").code == 0
     done = call("review", out, *options, "edp")
-    assert done.code == 1 and "nobody can tell labels from what was found" in done.err
+    assert done.code == 1 and "labels cannot be distinguished from what was found" in done.err
 
 
 def test_labels_around_a_rejected_tower_end_and_those_of_its_neighbour_stay():

@@ -146,15 +146,15 @@ BAD = {
     "empty": ("", "the file is empty"),
     "header": ("id,x,y\n", "there is no asset in it"),
     "columns": ("id,a,b\n1,2,3\n", "no columns with coordinates among id, a, b"),
-    "number": ("id,x,y\n1,12,abc\n", "row 2: 'abc' in column 'y' is no number"),
+    "number": ("id,x,y\n1,12,abc\n", "row 2: 'abc' in column 'y' is not a number"),
     "half": ("id,x,y\n1,12,\n", "row 2: it has no y"),
     "twice": ("id,x,y\n7,1,2\n8,1,2\n7,3,4\n", "row 4: the id '7' of column 'id' is also that"),
     "nowhere": ("id,x,y\n1,,\n", "none of its assets has coordinates"),
     "commas": ("id,x,y\n1,500020,5,4630020,5\n", "row 2: it has 5 cells, and the header has 3"),
     "same": ("id,x,x\n1,2,3\n", "two columns have the name 'x'"),
     "far": ("id,x,y\n1,1000,1000\n", "none of the assets is within 10 km of the survey"),
-    "degrees": ("id,lon,lat\n1,500020,4630020\n", "row 2: it is no longitude and latitude"),
-    "swapped": ("id,lon,lat\n1,41.8,-190\n", "row 2: it is no longitude and latitude"),
+    "degrees": ("id,lon,lat\n1,500020,4630020\n", "row 2: it is not a longitude and latitude"),
+    "swapped": ("id,lon,lat\n1,41.8,-190\n", "row 2: it is not a longitude and latitude"),
 }
 
 

@@ -183,12 +183,12 @@ def test_a_row_that_matches_nothing_is_reported_and_the_others_count(call, found
 
 FAULTS = {
     "unknown id": (_row(id=77, decision="accept"), "no tower of line.towers.csv has the id 77"),
-    "unknown decision": (_row(id="{0}", decision="maybe"), "'maybe' is no decision"),
+    "unknown decision": (_row(id="{0}", decision="maybe"), "'maybe' is not a decision"),
     "no tower": (_row(decision="reject"), "it names no tower"),
     "no place": (_row(decision="add"), "a tower is added without coordinates"),
     "half a place": (_row(x=1, decision="add"), "it has no y"),
-    "no number": (_row(x="abc", y=2, decision="add"), "'abc' in column 'x' is no number"),
-    "half an id": (_row(id="12.5", decision="accept"), "is no whole number"),
+    "no number": (_row(x="abc", y=2, decision="add"), "'abc' in column 'x' is not a number"),
+    "half an id": (_row(id="12.5", decision="accept"), "is not a whole number"),
     "own id": (_row(id=5, x=500_000, y=4_630_000, decision="add"), "is added with the id 5"),
     "elsewhere": (
         _row(id="{0}", x=500_200, y=4_630_020, decision="accept"), "from the coordinates of this",

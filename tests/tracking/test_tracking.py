@@ -516,7 +516,7 @@ def test_the_best_seed_is_in_the_registry_and_predicts_a_batch_of_any_size(
     np.testing.assert_allclose(answer, expected, atol=1e-6)
 
     again = register_champions(*arguments)
-    assert again["scenenet-scenenet"]["version"] == 1, "the same champion is no new version"
+    assert again["scenenet-scenenet"]["version"] == 1, "the same champion is not a new version"
     # Another seed becomes the best: the alias moves, the first version stays.
     better = results.folder / "tune" / "scenenet" / f"seed-{1 - best.seed}.json"
     tuning = json.loads(better.read_text())

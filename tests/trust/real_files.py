@@ -93,12 +93,12 @@ def _run(file: Path, command: str, arguments: list[object], out: Path | None = N
     except subprocess.TimeoutExpired:
         return Outcome(file, command, False, HUNG_S, HUNG_S, "", (f"hung for {HUNG_S:g} s",))
     seconds, used = time.perf_counter() - start, _cpu_seconds() - used
-    told = [x for x in done.stderr.splitlines() if x.startswith(("error:", "warning:"))]
-    message = "\n".join(told)
+    named = [x for x in done.stderr.splitlines() if x.startswith(("error:", "warning:"))]
+    message = "\n".join(named)
     faults = []
     if done.returncode not in (0, 1) or "Traceback" in done.stderr:
         faults.append(f"ended with code {done.returncode}: {done.stderr[-2000:]}")
-    if done.returncode == 1 and not any(x.startswith("error:") and file.name in x for x in told):
+    if done.returncode == 1 and not any(x.startswith("error:") and file.name in x for x in named):
         faults.append("no error names the file")
     left = [] if out is None else sorted(path.name for path in out.iterdir())
     if done.returncode == 1 and left:

@@ -1,4 +1,4 @@
-"""Real recordings, which are no part of the project: ``check`` and ``predict`` on each of them."""
+"""Real recordings, which are not part of the project: ``check`` and ``predict`` on each of them."""
 
 from __future__ import annotations
 

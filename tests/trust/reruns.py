@@ -28,7 +28,7 @@ CHANGES = {
     "test_replacing_a_survey_by_an_older_file_runs_its_jobs",
     "two settings swap their values": "test_reruns.py::"
     "test_swapping_the_values_of_two_settings_trains_again",
-    "a parameter is no plain dict": "test_rules.py::"
+    "a parameter is not a plain dict": "test_rules.py::"
     "test_every_input_and_output_has_a_name_and_the_parameter_is_one_dict",
     "the survey sheet is sorted anew": "test_reruns.py::"
     "test_the_order_and_the_date_of_the_sheet_have_no_effect",

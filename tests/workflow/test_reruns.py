@@ -13,7 +13,7 @@ from fixtures.kernel_file import RING
 pytestmark = pytest.mark.workflow
 
 CLASSIFIED = {"predict": 1, "prediction_map": 1, "review_template": 1, "report": 1}
-"""Jobs of a survey to classify that nobody has reviewed."""
+"""Jobs of a survey to classify, without a review."""
 PREDICTED = {**CLASSIFIED, "review": 1}
 """Jobs after a change of the best model; there is one survey to classify, which was reviewed."""
 

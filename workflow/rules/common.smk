@@ -120,7 +120,7 @@ def content_of(path):
 
 
 def tower_list(survey):
-    """What ``scenenet.review`` reads of a prediction: the list, and what stands beside it."""
+    """What ``scenenet.review`` reads of a prediction: the list and the files beside it."""
     folder = f"{R}/predict/{survey}/{survey}"
     return {
         "table": f"{folder}.towers.csv",
@@ -197,7 +197,7 @@ def scheme_of(survey):
 
 def classes_of(survey):
     """What lines need besides the models: the classes of a survey, by which points near a conductor
-    are told apart, and how clearances are measured. Without lines, nothing."""
+    are distinguished, and how clearances are measured. Without lines, nothing."""
     if not settings.finds_lines():
         return {}
     return {**scheme_of(survey), "clearance": SETTINGS["clearance"]}

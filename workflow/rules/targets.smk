@@ -55,7 +55,7 @@ def of_study(study, output):
 
 def every_output():
     """Rule -> every file that it makes, for all rules so far. Written tiles are known later
-    (``every_written_tile``). Synthetic surveys are no targets: what
+    (``every_written_tile``). Synthetic surveys are not targets: what
     is made from them is complete without them, and to make one again would train everything again.
     """
     return {
@@ -164,8 +164,8 @@ def all_results():
 @cache
 def dataset_figures():
     """The figures of the data set and of the models, which one job draws."""
-    told = results_of()
-    return plan(Results(**{**told, "folder": R, "models": dict(told["models"]), "studies": ()}))
+    arguments = results_of()
+    return plan(Results(**{**arguments, "folder": R, "models": dict(arguments["models"]), "studies": ()}))
 
 
 def model_figures():

@@ -266,7 +266,7 @@ if settings.finds_lines():
 
 
 # The towers and the conductors that reach into a tile are small files, which Snakemake compares by their
-# content. They are no output of a rule, but within one: else each tile would be written again whenever
+# content. They are not outputs of a rule, but within one: else each tile would be written again whenever
 # towers are found.
 rule write_tile:
     input:

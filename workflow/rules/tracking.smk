@@ -1,6 +1,6 @@
 """MLflow: the store, and a run for every training.
 
-The database is no output of a rule. It holds the runs of other data and of other people, and Snakemake
+The database is not an output of a rule. It holds the runs of other data and of other people, and Snakemake
 deletes, or restores, the outputs of a job that fails. The record of the store says which database it
 belongs to; ``request_for`` compares the two, so a database that was deleted or replaced is made again.
 """

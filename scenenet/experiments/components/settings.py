@@ -8,7 +8,7 @@ from scenenet.core.settings import Settings
 
 WITHOUT, WITH, ITS_OWN = "without rules", "with rules", "its own"
 """Values of the column `rules`: the voxels at or above tau as they are; the answer of ``scenenet
-predict``; an answer that is no probabilities, to which the rules do not apply."""
+predict``; an answer without probabilities, to which the rules do not apply."""
 
 NOTHING = "nothing"
 """Name of the trivial answer that there is no tower."""

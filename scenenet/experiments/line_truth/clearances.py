@@ -29,7 +29,7 @@ SAME_POINT_M = 0.05
 
 
 STANDING, ABOVE_GROUND_M = (SCRUB, TREE, LOW, TALL), 0.5
-"""Class codes of what stands on the ground, and m above it from which a point is no ground."""
+"""Class codes of what stands on the ground, and m above it from which a point is not ground."""
 
 
 @dataclass(frozen=True)
@@ -149,7 +149,7 @@ def _shown(found: SurveyClearances, limit: float) -> np.ndarray:
 
     Places that are joined by what is found between them are listed as one, at their worst point.
     The profile of the span shows the others. What is thin and straight in the air, as a cable is,
-    is listed as a wire, which has a limit of its own and is no danger from the same distance.
+    is listed as a wire, which has a limit of its own and is not a danger from the same distance.
     """
     plants = [place for place in found.dangers if place.kind == VEGETATION]
     listed = plants + [place for place in found.places if place.kind == WIRE]

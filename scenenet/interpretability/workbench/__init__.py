@@ -1,1 +1,1 @@
-"""The workbench: what a kernel is, what it answers to, and a template for a new one."""
+"""The workbench: what a kernel is, what it responds to, and a template for a new one."""

@@ -46,7 +46,7 @@ class KernelDescription:
 
     Attributes:
         name: of the kernel.
-        answers_to: the first sentence of its file.
+        responds_to: the first sentence of its file.
         formula: the docstring of its class.
         origin: ``built in``, the path of its file, or a package with its version.
         sums_to_zero: whether every horizontal slice is meant to sum to zero.
@@ -56,7 +56,7 @@ class KernelDescription:
     """
 
     name: str
-    answers_to: str
+    responds_to: str
     formula: str
     origin: str
     sums_to_zero: bool
@@ -134,7 +134,7 @@ def describe(name: str) -> KernelDescription:
     source = KERNELS.source_named(name)
     return KernelDescription(
         name=name,
-        answers_to=_first_sentence(kernel),
+        responds_to=_first_sentence(kernel),
         formula=inspect.cleandoc(type(kernel).__doc__ or ""),
         origin=BUILT_IN if source is None else source.where,
         sums_to_zero=kernel.sums_to_zero,

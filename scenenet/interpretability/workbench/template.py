@@ -10,7 +10,7 @@ from scenenet.core.outputs import Output, check_outputs
 from scenenet.core.provided_code import KERNELS
 
 KERNEL = '''\
-"""A thin vertical column with nothing around it: say here what CLASS answers to."""
+"""A thin vertical column with nothing around it: say here what CLASS responds to."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ class CLASS(GeneoKernel):
 
     def sample(self, lattice: Lattice, shape: Mapping[str, Tensor]) -> Tensor:
         # x and y count only as the distance from the axis, so the kernel looks the same from every
-        # side: turning the scene turns the answer.
+        # side: turning the scene turns the response.
         column = torch.exp(-lattice.planar_squared / (2 * shape["r"] ** 2))
         return zero_sum(column.expand(lattice.size), lattice.inside)
 '''
 
 TEST = '''\
-"""What the kernel NAME answers to, and what a GENEO has to be. Run it with: pytest test_NAME.py"""
+"""What the kernel NAME responds to, and properties of a GENEO: pytest test_NAME.py"""
 
 from __future__ import annotations
 
@@ -76,18 +76,18 @@ def sampled() -> tuple[Tensor, dict[str, Tensor]]:
     return KERNEL.sample(LATTICE, shape), shape
 
 
-def answer(occupied: Tensor) -> float:
+def response(occupied: Tensor) -> float:
     """The response at the centre of a scene, given as occupied voxels (kz, ky, kx)."""
     return float((sampled()[0] * occupied).sum().detach())
 
 
-def test_it_answers_to_its_shape_and_not_to_the_ground() -> None:
+def test_it_responds_to_its_shape_and_not_to_the_ground() -> None:
     everywhere = torch.ones(LATTICE.size)
     column = everywhere * (LATTICE.planar_squared < 0.25)
     ground = everywhere * (LATTICE.z == 0)
-    assert answer(column) > 0
-    assert abs(answer(ground)) < 1e-3 * answer(column)
-    assert answer(everywhere) < answer(column)
+    assert response(column) > 0
+    assert abs(response(ground)) < 1e-3 * response(column)
+    assert response(everywhere) < response(column)
 
 
 def test_every_slice_sums_to_zero() -> None:
@@ -95,7 +95,7 @@ def test_every_slice_sums_to_zero() -> None:
     assert float(kernel.sum(dim=(1, 2)).abs().max().detach()) < 1e-4 * float(kernel.abs().sum())
 
 
-def test_a_quarter_turn_of_the_scene_turns_the_answer() -> None:
+def test_a_quarter_turn_of_the_scene_turns_the_response() -> None:
     kernel, _ = sampled()
     assert torch.allclose(kernel, torch.rot90(kernel, 1, (1, 2)), atol=1e-6)
 

@@ -1,4 +1,4 @@
-"""A kernel on a survey: where it answers, to which classes, and how equivariant it is."""
+"""The response of a kernel on a survey, by place and by class, and its equivariance."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Trial:
-    """What a kernel answers on a survey.
+    """The response of a kernel on a survey.
 
     Attributes:
         kernel, survey: names.

@@ -131,7 +131,7 @@ class Screening:
             found += [Finding(*each) for each in map_findings(self.info.crs, middle[:2])]
         found += [Finding(*each) for each in self._steps.findings()]
         relief = [Finding(*each) for each in self._relief.findings(self.n_points)]
-        # Coordinates that are no metres have no density.
+        # Coordinates that are not in metres have no density.
         found += relief or [Finding(*each) for each in self._density.findings(self.n_points)]
         if self.scheme is not None:
             codes = self.counts, self.scheme, self.info.format, self._target

@@ -30,7 +30,7 @@ MOST_WARNINGS = 10
 def not_seen(detection: DetectionSettings) -> list[str]:
     """What the list of towers does not show, as sentences."""
     sentences = [
-        "Nobody has confirmed these towers. Look at each before you act on it.",
+        "These towers are not confirmed. Check each before you act on it.",
         f"Towers lower than {detection.min_height:g} m are not in the list.",
         "A tower of which the survey has too few points is not in the list.",
     ]

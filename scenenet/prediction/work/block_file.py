@@ -42,7 +42,7 @@ class BlockWriter:
         self._offset += size
 
     def end(self, facts: Mapping[str, Any]) -> None:
-        """Write the index, and ``facts`` as JSON. Without this the file is no file of blocks."""
+        """Write the index, and ``facts`` as JSON. Without this the file is not a file of blocks."""
         head = json.dumps({"kinds": self._kinds, "facts": facts}).encode()
         index = np.array(self._entries, _ENTRY).tobytes()
         sizes = np.array([len(head), len(index)], "<i8").tobytes()

@@ -69,8 +69,8 @@ class PlannedFile:
 
     Attributes:
         known: its fingerprint; None if it could not be read.
-        box: (x, y, x, y), lowest and highest, in its units, by which its neighbours were told; None
-            without points.
+        box: (x, y, x, y), lowest and highest, in its units, by which its neighbours were found;
+            None without points.
     """
 
     known: str | None
@@ -107,7 +107,7 @@ class PlannedFile:
         if away > (max(info.scales[:2]) if info.scales else 0.0):
             raise InputError(
                 f"points lie up to {away:.6g} {info.unit_names[0]} outside the bounding box of its "
-                "header, by which the workflow tells which tiles are neighbours",
+                "header, from which the workflow finds the neighbours of a tile",
                 file=file.path,
                 remedy="Write its header again, for example with pdal translate or lasinfo "
                 "-repair_bb",

@@ -38,7 +38,7 @@ NUMBERS = (
 
 
 def claims(context: ReportContext) -> Section | None:
-    """Every claim with its verdict, and on what data, where the run tells at least one."""
+    """Every claim with its verdict, and on what data, where the run decides at least one."""
     frame = _both(context, "claims")
     if frame is None or _all_open(frame):
         return None
@@ -53,12 +53,12 @@ def claims(context: ReportContext) -> Section | None:
 
 
 def open_claims(context: ReportContext) -> Section | None:
-    """Every claim, where the run tells none. Its reader looks for other things first."""
+    """Every claim, where the run decides none. Its reader looks for other things first."""
     frame = _both(context, "claims")
     if frame is None or not _all_open(frame):
         return None
-    said = f"This run tells none of the {len(frame)} claims of chapter 5. {_data(context)}".strip()
-    return Section("claims", "What the thesis claims", [Text(said), _table(frame)])
+    text = f"This run decides none of the {len(frame)} claims of chapter 5. {_data(context)}"
+    return Section("claims", "What the thesis claims", [Text(text.strip()), _table(frame)])
 
 
 def _all_open(frame: pd.DataFrame) -> bool:

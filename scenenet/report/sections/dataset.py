@@ -83,9 +83,8 @@ CROPS = (
 )
 CROPS_CAPTION = (
     "The crops, and the true towers in them where the truth is known, with the values of thesis "
-    "5.1.1 to 5.1.3. The row wrong is the share of the points labelled tower that are no tower. "
-    "The thesis measured labelled towers, whose bases are wider than the true ones by what is "
-    "labelled wrongly."
+    "5.1.1 to 5.1.3. The row wrong is the share of mislabelled tower points. The thesis measured "
+    "labelled towers, whose bases are wider than the true ones because of wrong labels."
 )
 
 

@@ -87,7 +87,7 @@ def predictions(context: ReportContext) -> Section | None:
 
 
 def _reviewed(counts: Mapping[str, int] | None) -> list[tuple[str, str]]:
-    """What people decided about the towers of a survey; nothing if nobody reviewed it."""
+    """What people decided about the towers of a survey; nothing without a review."""
     if counts is None:
         return []
     decided = ("accepted", "rejected", "added", "not_reviewed")

@@ -48,8 +48,8 @@ class LabelFiles:
         """
         if found.classified:
             raise InputError(
-                "its points were given class codes by --classify, so nobody can tell labels from "
-                "what was found",
+                "its points were given class codes by --classify, so labels cannot be "
+                "distinguished from what was found",
                 file=found.path,
                 remedy="Predict the survey again without --classify",
             )

@@ -101,7 +101,7 @@ class Relabelling:
         from scipy.spatial import cKDTree
 
         groups = cluster(labelled, TowerSettings())
-        # Groups that are no tower lie beside one, or are too low or sparse.
+        # Groups that are not tower lie beside one, or are too low or sparse.
         label = np.where(groups.tower >= 0, groups.tower, groups.left_out + groups.tower.max() + 1)
         rejected, kept = cKDTree(self._rejected_at), None
         apart, _ = rejected.query(labelled[:, :2])

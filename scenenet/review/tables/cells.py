@@ -30,7 +30,7 @@ def number_of(cell: object) -> float | None:
     three digits, and the other one of the two separates the decimals then.
 
     Raises:
-        ValueError: it is no finite number.
+        ValueError: it is not a finite number.
     """
     if isinstance(cell, int | float) and not isinstance(cell, bool):
         number = float(cell)
@@ -42,7 +42,7 @@ def number_of(cell: object) -> float | None:
             return None
         number = _parsed(text)
     if not math.isfinite(number):
-        raise ValueError(f"{cell!r} is no number")
+        raise ValueError(f"{cell!r} is not a number")
     return number
 
 
@@ -61,11 +61,11 @@ def whole_number_of(cell: object) -> int | None:
     """The cell as a whole number; None for an empty one.
 
     Raises:
-        ValueError: it is no whole number.
+        ValueError: it is not a whole number.
     """
     number = number_of(cell)
     if number is None:
         return None
     if not number.is_integer():
-        raise ValueError(f"{cell!r} is no whole number")
+        raise ValueError(f"{cell!r} is not a whole number")
     return int(number)

@@ -30,7 +30,7 @@ def read_csv(path: Path) -> Table:
     try:
         records = list(csv.reader(lines, delimiter=separator))
     except csv.Error as error:
-        raise InputError(f"this is no CSV file ({error})", file=path) from None
+        raise InputError(f"this is not a CSV file ({error})", file=path) from None
     header = [name.strip() for name in records[0]]
     while header and not header[-1]:  # a separator at the end of each line
         header.pop()
@@ -71,7 +71,7 @@ def _decoded(path: Path) -> str:
             continue
         if "\0" not in text:
             return text
-    raise InputError("this is no text file", file=path, remedy="Save the table as CSV (UTF-8)")
+    raise InputError("this is not a text file", file=path, remedy="Save the table as CSV (UTF-8)")
 
 
 def _check_header(path: Path, header: list[str]) -> None:

@@ -35,7 +35,7 @@ def read_layer(path: Path, layer: str | None = None) -> Table:
         layer: None for the only one.
 
     Raises:
-        InputError: the file cannot be read, has no such layer, or a feature is no point.
+        InputError: the file cannot be read, has no such layer, or a feature is not a point.
     """
     import pyogrio
     import shapely
@@ -62,7 +62,7 @@ def _layer(path: Path, wanted: str | None) -> str:
     there = layers_of(path)
     if wanted is not None and wanted in there:
         return wanted
-    # The table from which QGIS takes its styles is no data.
+    # The table from which QGIS takes its styles is not data.
     data = [name for name in there if name != "layer_styles"]
     if wanted is None and len(data) == 1:
         return data[0]

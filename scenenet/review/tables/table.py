@@ -42,13 +42,13 @@ class Row:
         """The number in a column; None where the cell is empty or the table has no such column.
 
         Raises:
-            InputError: it is no number.
+            InputError: it is not a number.
         """
         try:
             return None if column is None else number_of(self.cells.get(column))
         except ValueError:
             raise self.error(
-                f"{self.text(column)!r} in column {column!r} is no number",
+                f"{self.text(column)!r} in column {column!r} is not a number",
                 "Correct it, or leave the cell empty",
             ) from None
 
@@ -56,13 +56,13 @@ class Row:
         """The whole number in a column; as ``number``.
 
         Raises:
-            InputError: it is no whole number.
+            InputError: it is not a whole number.
         """
         try:
             return None if column is None else whole_number_of(self.cells.get(column))
         except ValueError:
             raise self.error(
-                f"{self.text(column)!r} in column {column!r} is no whole number",
+                f"{self.text(column)!r} in column {column!r} is not a whole number",
                 "Correct it, or leave the cell empty",
             ) from None
 
@@ -112,7 +112,7 @@ def read_table(path: str | Path, layer: str | None = None) -> Table:
         layer: of a GeoPackage; None for its only one.
 
     Raises:
-        InputError: the file cannot be read, or is no table.
+        InputError: the file cannot be read, or is not a table.
     """
     from scenenet.review.tables.csv_file import read_csv
     from scenenet.review.tables.layer import read_layer

@@ -16,7 +16,7 @@ EXAMPLES = ("scenenet geneo list", "scenenet geneo list --kernels my_kernels/ --
 
 
 def command(kernels: Kernels = None, as_json: AsJson = False) -> None:
-    """List all kernels: what each answers to, its parameters, and where it is from.
+    """List all kernels: what each responds to, its parameters, and its origin.
 
     Provided kernels are run. The exit code is 1 if one of them fails; the others are listed.
     """
@@ -30,7 +30,7 @@ def command(kernels: Kernels = None, as_json: AsJson = False) -> None:
 
 
 def _lines(kernel: KernelDescription) -> list[str]:
-    lines = [f"{kernel.name} ({kernel.origin}): {kernel.answers_to}"]
+    lines = [f"{kernel.name} ({kernel.origin}): {kernel.responds_to}"]
     lines += [f"    {_parameter(asdict(p))}" for p in kernel.parameters]
     return lines
 

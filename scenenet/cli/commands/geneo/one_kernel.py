@@ -97,7 +97,7 @@ def command(
 
 
 def _head(kernel: KernelDescription, parameters: tuple[ParameterDescription, ...]) -> list[str]:
-    lines = [f"{kernel.name} ({kernel.origin}): {kernel.answers_to}", "", kernel.formula]
+    lines = [f"{kernel.name} ({kernel.origin}): {kernel.responds_to}", "", kernel.formula]
     if parameters:
         lines.append("")
     for p in parameters:
@@ -113,7 +113,7 @@ def _facts(facts: KernelFacts, kernel: KernelDescription) -> list[str]:
     size = "x".join(map(str, facts.size))
     zero = "yes" if facts.sums_to_zero else f"no, up to {facts.slice_sum:.3g}"
     turn, what = facts.quarter_turn_error, "the orbit" if facts.directions > 1 else "it"
-    orbit = ["the orbit, over which the answer is the largest: " + _directions(kernel)]
+    orbit = ["the orbit, whose largest response counts: " + _directions(kernel)]
     return [
         *(orbit if facts.directions > 1 else []),
         f"{size} voxels of {facts.voxel_size:g} m, from {facts.lowest:.3g} to {facts.highest:.3g}",

@@ -67,12 +67,12 @@ def command(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Try a kernel on a survey: what it answers to, by class, and where it answers most.
+    """Try a kernel on a survey: its response to each class, and where it is highest.
 
-    The answer is the response of the kernel alone at each occupied voxel, before any training. Of a
-    large survey it is a square (--at, --window), and the output says which.
+    The response is that of the kernel alone at each occupied voxel, before any training. A large
+    survey is tried on a square (--at, --window), which the output names.
 
-    Its equivariance is measured on a generated scene, the same for every kernel. A page that exists
+    The equivariance is measured on a generated scene, the same for every kernel. A page that exists
     is replaced only if this command wrote it.
     """
     from scenenet.core.extras import require
@@ -100,7 +100,7 @@ def _place(text: str) -> tuple[float, float]:
     """x and y of ``--at``.
 
     Raises:
-        typer.BadParameter: it is no pair of numbers.
+        typer.BadParameter: it is not a pair of numbers.
     """
     try:
         x, y = map(float, text.split(","))
@@ -141,12 +141,12 @@ def _lines(trial: Trial, out: Path | None) -> list[str]:
             f"{f'{c.code} {c.name}'.strip():<34}{c.points:>10,}{c.mean:>10.3f}{c.positive:>10.1%}"
             f"{c.highest:>10.3f}"
         )
-    lines += ["", f"{'highest answers':<12}{'x':>14}{'y':>14}{'z':>10}{'response':>10}  class"]
+    lines += ["", f"{'highest responses':<17}{'x':>14}{'y':>14}{'z':>10}{'response':>10}  class"]
     for number, p in enumerate(trial.places, start=1):
         lines.append(
-            f"{number:<15}{p.x:>14.2f}{p.y:>14.2f}{p.z:>10.2f}{p.response:>10.3f}  "
+            f"{number:<17}{p.x:>14.2f}{p.y:>14.2f}{p.z:>10.2f}{p.response:>10.3f}  "
             f"{p.code} {p.name}"
         )
     if not trial.places:
-        lines.append("no answer is positive")
+        lines.append("no response is positive")
     return lines if out is None else [*lines, "", f"{out}: the page"]

@@ -81,7 +81,7 @@ function showTower(tower, check) {
   byId("tower-place").textContent = `at x ${tower.x.toFixed(2)}, y ${tower.y.toFixed(2)}`;
   entries(byId("doubts"), tower.doubts);
   entries(byId("evidence"), tower.evidence);
-  byId("receipt").hidden = !tower.shares.length;
+  byId("explanation").hidden = !tower.shares.length;
   byId("shares").replaceChildren(...tower.shares.map(([name, share, meaning]) => {
     const row = document.createElement("tr");
     for (const text of [name.replaceAll("_", " "), (100 * share).toFixed(1), meaning]) row.insertCell().textContent = text;

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+from scenenet.metrics.score_columns import ScoreFields
 from scenenet.metrics.tower_matching import TowerMatch
 from scenenet.metrics.voxel_scores import Confusion, VoxelScores
 from scenenet.pointcloud.targets import TOWER
@@ -66,12 +67,16 @@ class PointScores:
 
 
 @dataclass(frozen=True)
-class SampleScores:
-    """The scores of one crop.
+class _Sample:
+    id: str
+
+
+@dataclass(frozen=True)
+class SampleScores(ScoreFields, _Sample):
+    """The scores of one crop; ``_Sample`` puts its id first in files.
 
     Attributes:
         id: of the crop.
-        precision, recall, f05, iou_tower, miou: as in ``VoxelScores``.
         tp, fp, fn, tn: numbers of voxels.
         towers_true, towers_predicted: number of labelled or true, and of detected towers.
         position_error_m: m, smallest position error of a true positive; None without any.
@@ -79,12 +84,6 @@ class SampleScores:
         points: scores of its points; None where they were not counted.
     """
 
-    id: str
-    precision: float | None
-    recall: float | None
-    f05: float | None
-    iou_tower: float | None
-    miou: float | None
     tp: int
     fp: int
     fn: int

@@ -1,7 +1,8 @@
 """The scores that every table reports, each declared once (thesis 5.2.4.1).
 
 Tables, studies, cross-validation, label noise, MLflow runs, the report and the command line take
-their columns from here. A score that is added to ``SCORE_COLUMNS`` appears in all of them.
+their columns from here. A score that is added to ``SCORE_COLUMNS`` and to ``ScoreFields`` appears
+in all of them.
 """
 
 from __future__ import annotations
@@ -153,6 +154,18 @@ SCORE_COLUMNS = (
     ),
 )
 """Every score, in the order of the tables."""
+
+
+@dataclass(frozen=True)
+class ScoreFields:
+    """The value of each score of ``SCORE_COLUMNS``, in this order; None if it is not defined."""
+
+    precision: float | None
+    recall: float | None
+    f05: float | None
+    iou_tower: float | None
+    miou: float | None
+
 
 SCORES = tuple(column.name for column in SCORE_COLUMNS)
 TOWER_ONLY_SCORES = tuple(column.name for column in SCORE_COLUMNS if column.tower_only)

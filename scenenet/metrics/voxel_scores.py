@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenenet.metrics import score_columns
-from scenenet.metrics.score_columns import SCORE_COLUMNS
+from scenenet.metrics.score_columns import SCORE_COLUMNS, ScoreFields
 
 
 @dataclass(frozen=True)
@@ -97,21 +97,14 @@ def confusion(
 
 
 @dataclass(frozen=True)
-class VoxelScores:
-    """Voxel scores at tau over all crops; None where one is not defined.
+class VoxelScores(ScoreFields):
+    """Voxel scores at tau over all crops.
 
     Attributes:
-        precision, recall, f05, iou_tower: of the tower class.
-        miou: mean IoU over background and tower.
         tau: the threshold.
         n_samples: number of crops.
     """
 
-    precision: float | None
-    recall: float | None
-    f05: float | None
-    iou_tower: float | None
-    miou: float | None
     tau: float
     n_samples: int
 

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from scenenet.metrics.score_columns import score_text
+from scenenet.metrics.score_columns import SCORES, ScoreFields, score_text
 from scenenet.metrics.threshold_curve import THRESHOLDS, ThresholdCurve, curve_columns
 from scenenet.metrics.tower_matching import TowerMatch, match_towers
 from scenenet.metrics.voxel_scores import Confusion, confusion
 
 # 2 tp, 1 fp, 4 fn, 13 tn of 20 voxels
-MOCK = Confusion(tp=2, fp=1, fn=4, tn=13)
+SMALL = Confusion(tp=2, fp=1, fn=4, tn=13)
 
 steps = st.integers(1, 1000)
 probabilities = st.one_of(
@@ -31,14 +33,18 @@ predictions = st.integers(1, 50).flatmap(
 
 
 def test_scores_of_a_small_confusion_by_hand():
-    assert MOCK.precision == pytest.approx(2 / 3)
-    assert MOCK.recall == pytest.approx(2 / 6)
+    assert SMALL.precision == pytest.approx(2 / 3)
+    assert SMALL.recall == pytest.approx(2 / 6)
     # 1.25 P R / (0.25 P + R) = 1.25 * 2/9 / (1/6 + 1/3)
-    assert MOCK.f05 == pytest.approx(1.25 * (2 / 9) / 0.5)
-    assert MOCK.iou_tower == pytest.approx(2 / 7)
-    assert MOCK.iou_background == pytest.approx(13 / 18)
-    assert MOCK.miou == pytest.approx((2 / 7 + 13 / 18) / 2)
-    assert MOCK.scores().keys() == {"precision", "recall", "f05", "iou_tower", "miou"}
+    assert SMALL.f05 == pytest.approx(1.25 * (2 / 9) / 0.5)
+    assert SMALL.iou_tower == pytest.approx(2 / 7)
+    assert SMALL.iou_background == pytest.approx(13 / 18)
+    assert SMALL.miou == pytest.approx((2 / 7 + 13 / 18) / 2)
+
+
+def test_every_score_has_a_field():
+    """Files of scores have their columns from ``ScoreFields``, tables from ``SCORE_COLUMNS``."""
+    assert tuple(field.name for field in fields(ScoreFields)) == SCORES
 
 
 def test_precision_counts_more_than_recall():
@@ -55,9 +61,6 @@ def test_predicting_nothing_scores_half_in_the_thesis_iou_and_0_for_the_tower():
 
 def test_a_perfect_prediction_scores_one():
     assert set(Confusion(tp=5, tn=95).scores().values()) == {1.0}
-
-
-SCORES = ("precision", "recall", "f05", "iou_tower", "miou")
 
 
 @pytest.mark.parametrize(
@@ -94,7 +97,7 @@ def test_a_score_is_written_in_a_sentence():
 
 
 def test_counts_of_samples_add_up():
-    assert MOCK + Confusion(1, 2, 3, 4) == Confusion(3, 3, 7, 17)
+    assert SMALL + Confusion(1, 2, 3, 4) == Confusion(3, 3, 7, 17)
 
 
 def test_a_voxel_is_a_tower_from_tau_on():

@@ -163,7 +163,7 @@ def test_figure_5_6_is_a_crop_with_the_contribution_of_each_geneo(finished, rank
 
 def test_every_study_of_the_thesis_is_in_the_configuration(project_root):
     studies = yaml.safe_load((project_root / "config" / "studies.yaml").read_text())["studies"]
-    assert {study["name"]: study["place"] for study in studies} == STUDIES
+    assert STUDIES.items() <= {study["name"]: study["place"] for study in studies}.items()
 
 
 LISTED = {

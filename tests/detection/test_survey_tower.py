@@ -7,11 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from fixtures.sound_tower import SOUND_TOWER
 
 from scenenet.core.errors import InputError
 from scenenet.detection.survey_tower import TOWER_COLUMNS, SurveyTower, read_towers
 
-TOWER = SurveyTower(
+TOWER = replace(
+    SOUND_TOWER,
     id=1,
     x=512_000.25,
     y=4_630_000.5,

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from fixtures.sound_tower import SOUND_TOWER
 
-from scenenet.detection.survey_tower import SurveyTower
 from scenenet.interpretability.explanations import TowerExplanation, explanations
 
-TOWER = SurveyTower(
-    id=1, x=1.0, y=2.0, height=21.4, base=104.2, width=1.9, conductor_directions=2,
-    conductor_bearings=(251.2, 70.8), probability=0.99, points=400, edge_distance=50.0,
+TOWER = replace(
+    SOUND_TOWER, x=1.0, y=2.0, height=21.4, base=104.2, width=1.9,
+    conductor_bearings=(251.2, 70.8), points=400,
     contributions={"cylinder": 0.6, "arrow": -0.4},
 )  # fmt: skip
 ONE_SIDE = {"conductor_directions": 1, "conductor_bearings": (70.8,)}

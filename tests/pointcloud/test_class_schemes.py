@@ -47,7 +47,7 @@ def test_a_role_has_the_codes_of_its_standard(name, role, codes):
 @pytest.mark.parametrize("scheme", SCHEMES.values(), ids=SCHEMES)
 def test_a_scheme_lists_every_code_once_and_in_order(scheme):
     codes = [entry.code for entry in scheme.codes]
-    assert codes == list(range(len(codes)))
+    assert codes == sorted(set(codes))
     assert list(scheme.classes) == codes
     assert SCHEMES[scheme.name] is scheme
     assert set(scheme.roles(np.array(codes, np.uint8))) <= set(ROLE_COLOURS)
@@ -109,7 +109,7 @@ def test_the_documentation_has_the_table_of_schemes():
 
 
 def test_the_difference_names_towers_and_conductors_of_every_scheme():
-    assert difference() == (
+    assert difference().startswith(
         "edp: tower 15, conductor 16, 17; asprs: tower 15, conductor 13, 14; "
         "ts40k: tower 4, conductor 5"
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import sqlite3
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import laspy
@@ -13,10 +14,11 @@ import pyogrio
 import pyproj
 import pytest
 import shapely
+from fixtures.sound_tower import SOUND_TOWER
 
 from scenenet.core.files import sha256
 from scenenet.detection.settings import DetectionSettings
-from scenenet.detection.survey_tower import SurveyTower, read_towers
+from scenenet.detection.survey_tower import read_towers
 from scenenet.pointcloud import PointCloud, write_las
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
@@ -142,11 +144,11 @@ def test_classify_gives_the_points_of_towers_code_15(survey, model, tmp_path, ch
 
 
 def test_a_row_has_a_column_for_each_geneo():
-    tower = SurveyTower(
-        id=1, x=1.0, y=2.0, height=3.0, base=4.0, width=5.0, conductor_directions=2,
-        conductor_bearings=(12.34, 190.0), probability=0.9, points=10, edge_distance=50.0,
+    tower = replace(
+        SOUND_TOWER,
+        conductor_bearings=(12.34, 190.0),
         contributions={"cylinder": 0.75, "arrow": 0.25},
-    )  # fmt: skip
+    )
     row = tower.to_row()
     assert row["conductor_bearings"] == "12.3 190.0"
     assert (row["contribution_cylinder"], row["contribution_arrow"]) == (0.75, 0.25)

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from fixtures.sound_tower import SOUND_TOWER
 
 from scenenet.core.errors import InputError
 from scenenet.detection.survey_tower import SurveyTower, row_types
@@ -13,11 +14,6 @@ from scenenet.review.doubts import by_doubt
 from scenenet.review.found_list import FoundList, ListedTower
 
 FOOT = 0.3048
-SURE = SurveyTower(
-    id=0, x=0.0, y=0.0, height=20.0, base=0.0, width=1.0, conductor_directions=2,
-    conductor_bearings=(0.0, 180.0), probability=0.99, points=900, edge_distance=50.0,
-    contributions={"cylinder": 0.5},
-)  # fmt: skip
 
 
 def listed(*towers: SurveyTower, unit: float = 1.0) -> FoundList:
@@ -34,7 +30,7 @@ def listed(*towers: SurveyTower, unit: float = 1.0) -> FoundList:
 
 def line(*changed: dict) -> list[SurveyTower]:
     """Seven towers 100 m apart, the first ones changed."""
-    towers = [replace(SURE, id=n + 1, y=100.0 * n) for n in range(7)]
+    towers = [replace(SOUND_TOWER, id=n + 1, y=100.0 * n) for n in range(7)]
     for number, values in enumerate(changed):
         towers[number] = replace(towers[number], **values)
     return towers

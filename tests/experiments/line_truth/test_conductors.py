@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from fixtures.line_scene import PYLONS, known_line
+from fixtures.sound_tower import SOUND_TOWER
 
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.experiments.line_truth.conductors import compare, table
@@ -20,13 +21,11 @@ SETTINGS = {**PYLONS, "towers": 4, "seed": 4, "section": 0}
 def listed(corridor: Corridor) -> list[SurveyTower]:
     """The true towers, as a list has them, with their true numbers as ids."""
     return [
-        SurveyTower(
-            id=tower.id, x=tower.x, y=tower.y, height=tower.height, base=tower.base, width=2.0,
-            conductor_directions=2, conductor_bearings=(0.0, 180.0), probability=1.0, points=900,
-            edge_distance=50.0, contributions={},
+        replace(
+            SOUND_TOWER, id=tower.id, x=tower.x, y=tower.y, height=tower.height, base=tower.base
         )
         for tower in corridor.towers
-    ]  # fmt: skip
+    ]
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ import numpy as np
 from scenenet.clearance.kinds import NO_OBSTACLE, Surroundings, surroundings
 from scenenet.clearance.near_points import Near, near_points
 from scenenet.clearance.settings import ClearanceLimits, ClearanceSettings
+from scenenet.clearance.touching import AIR, MAY_BE, on_wires, with_touching
 from scenenet.clearance.trees import Trees, find_trees
 from scenenet.clearance.untraced import untraced
 from scenenet.line.frame import SpanFrame
@@ -25,10 +26,6 @@ AROUND_M = 20.0
 
 BEYOND_M = 20.0
 """m beyond the ends of a span whose points count: outside a bend they are abreast of no span."""
-
-OWN_M = 0.15
-"""m beyond the tube of a conductor within which points are still its own: the noise of single
-returns, spacers and vibration dampers."""
 
 
 @dataclass(frozen=True)
@@ -153,29 +150,19 @@ def look_around(
     """What the points in a section and around it are, without those of wires.
 
     Args:
-        wires: whose points are left out.
+        wires: whose points are left out, but for those that hang together with vegetation.
         points, scheme: as ``measure``.
         few_points: of ``ClearanceSettings``.
     """
     wide = Area(area.frame, area.first - AROUND_M, area.last + AROUND_M, area.half_width)
     found = points(wide)
-    free = ~on_wires(found.xyz, wires)
+    own = on_wires(found.xyz, wires)
+    free = own == AIR
     if found.wire is not None:
         doubtful = np.flatnonzero(found.wire & free)
         free[doubtful] = ~untraced(area.frame.to_frame(found.xyz[doubtful]))
     codes = None if found.codes is None else found.codes[free]
-    return surroundings(np.compress(free, found.xyz, axis=0), codes, scheme, few_points)
-
-
-def on_wires(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:
-    """(n,) bool: which points (n, 3) m are those of wires."""
-    own = np.zeros(len(xyz), bool)
-    for conductor in conductors:
-        curve, reach = conductor.catenary, conductor.tube + OWN_M
-        low = min(curve.start[2], curve.end[2]) - conductor.sag - reach
-        near = np.flatnonzero((xyz[:, 2] >= low) & ~own)
-        s, t = curve.along(xyz[near])
-        along = (s >= -reach) & (s <= curve.length + reach)
-        near = near[along & (np.abs(t) <= reach + abs(curve.blowout))]
-        own[near] = np.hypot(*curve.residuals(xyz[near])) <= reach
-    return own
+    around = surroundings(np.compress(free, found.xyz, axis=0), codes, scheme, few_points)
+    close = own == MAY_BE
+    codes = None if found.codes is None else found.codes[close]
+    return with_touching(around, found.xyz[close], codes, scheme)

@@ -161,7 +161,11 @@ def _turned(span: TracedSpan) -> TracedSpan:
     frame = span.frame
     x, y, _ = frame.to_map(np.array([[frame.length, 0.0, 0.0]]))[0].tolist()
     wires = (
-        replace(wire, catenary=Catenary(w.end, w.start, w.parameter, -w.blowout))
+        replace(
+            wire,
+            catenary=Catenary(w.end, w.start, w.parameter, -w.blowout),
+            offsets=wire.offsets * [-1.0, 1.0],
+        )
         for wire in span.wires for w in (wire.catenary,)
     )  # fmt: skip
     other = replace(frame, x=x, y=y, direction=-frame.direction)
@@ -186,7 +190,7 @@ def _conductors(span: TracedSpan, span_id: int, slack: float) -> list[Conductor]
         kind = "earth wire" if id(wire) in earth else "conductor"
         if curve.parameter < slack:
             kind = "cable"
-        tube = max(TUBE_M, TUBE_RMSE * wire.rmse) + (BUNDLE_M if wire.subconductors > 1 else 0.0)
+        tube = max(TUBE_M, TUBE_RMSE * wire.rmse) + (BUNDLE_M if len(wire.offsets) > 1 else 0.0)
         heights = (
             0.0 if tower is None else z - tower.base
             for tower, z in ((span.start, curve.start[2]), (span.end, curve.end[2]))
@@ -194,8 +198,9 @@ def _conductors(span: TracedSpan, span_id: int, slack: float) -> list[Conductor]
         from_height, to_height = heights
         found.append(
             Conductor(
-                catenary=curve, tube=tube, span_id=span_id, conductor_id=number + 1, kind=kind,
-                subconductors=wire.subconductors, from_tower=_id(span.start),
+                catenary=curve, tube=tube, offsets=tuple(map(tuple, wire.offsets.tolist())),
+                span_id=span_id, conductor_id=number + 1, kind=kind,
+                subconductors=len(wire.offsets), from_tower=_id(span.start),
                 to_tower=_id(span.end), c=curve.parameter, sag=curve.sag, blowout=curve.blowout,
                 length=curve.length,
                 rmse=wire.rmse, points=len(wire.rows), seen=wire.covered,

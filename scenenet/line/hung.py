@@ -79,14 +79,14 @@ class HungWire:
         rmse: m, of its points.
         rows: rows of its points in ``WirePoints``.
         covered: share of its length on which it is seen.
-        subconductors: wires of its bundle.
+        offsets: (k, 2) m, of the wires of its bundle to the left of the catenary and above it.
     """
 
     catenary: Catenary
     rmse: float
     rows: np.ndarray
     covered: float
-    subconductors: int
+    offsets: np.ndarray
 
     def between(self, first: float, last: float) -> HungWire:
         """The same wire between other distances from its start, m. It is not seen beyond its
@@ -163,4 +163,4 @@ def _hung(wire: Wire, rows: np.ndarray, frame: SpanFrame) -> HungWire:
     catenary = wire.fit.catenary
     start, end = frame.to_map(np.array([catenary.start, catenary.end]))
     on_map = Catenary.of(start, end, catenary.parameter, catenary.blowout)
-    return HungWire(on_map, wire.fit.rmse, rows, wire.covered, wire.bundle)
+    return HungWire(on_map, wire.fit.rmse, rows, wire.covered, wire.offsets)

@@ -29,10 +29,12 @@ class Conductor:
     Attributes:
         catenary: m, between its attachments; at an end without a tower, to its last point.
         tube: m, distance from the catenary within which points are its points.
+        offsets: m, of the wires of its bundle to the left of the catenary and above it.
     """
 
     catenary: Catenary
     tube: float
+    offsets: tuple[tuple[float, float], ...]
     span_id: int = column("", "number of its span", heading="span")
     conductor_id: int = column(
         "", "number in its span, from left to right and then from the top", heading="conductor"
@@ -78,6 +80,7 @@ class Conductor:
         curve = self.catenary
         return own | {
             "tube": self.tube,
+            "offsets": [list(each) for each in self.offsets],
             "catenary": [*curve.start, *curve.end, curve.parameter],
         }
 
@@ -87,7 +90,8 @@ class Conductor:
         x, y, z, far_x, far_y, far_z, parameter = data["catenary"]
         own = {c.name: data[c.name] for c in CONDUCTOR_COLUMNS}
         curve = Catenary((x, y, z), (far_x, far_y, far_z), parameter, data["blowout"])
-        return cls(catenary=curve, tube=data["tube"], **own)
+        offsets = tuple((left, above) for left, above in data["offsets"])
+        return cls(catenary=curve, tube=data["tube"], offsets=offsets, **own)
 
 
 @dataclass(frozen=True)

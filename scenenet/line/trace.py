@@ -59,6 +59,9 @@ PRIOR_SPREAD = 0.15
 MOST_GUESSES = 6000
 """Guesses that are compared at once."""
 
+SINGLE = np.zeros((1, 2))
+"""m, the offset of a wire that is no bundle."""
+
 FAR_M = 80.0
 """m, distance of two pieces from which a guess is as good as one from pieces further apart."""
 
@@ -71,13 +74,14 @@ class Wire:
         fit: the catenary, between the first and the last point.
         rows: rows of its points.
         covered: share of the windows between its ends in which it has points.
-        bundle: number of its subconductors; the catenary is that of their middle.
+        offsets: (k, 2) m, of its subconductors to the left of the catenary and above it. It is that
+            of their middle.
     """
 
     fit: Fit
     rows: np.ndarray
     covered: float
-    bundle: int = 1
+    offsets: np.ndarray
 
 
 def trace_wires(
@@ -283,7 +287,7 @@ def _bundled(
     Subconductors are parallel, so that their points lie at a few places when they are seen along
     the wire.
     """
-    single = Wire(replace(fit, catenary=catenary), rows, covered)
+    single = Wire(replace(fit, catenary=catenary), rows, covered, SINGLE)
     # A narrow fit may follow one subconductor, or go from one to another.
     wide = fit_catenary(stz[rows], np.ones(len(rows)), width=2 * IN_BUNDLE_M)
     if wide is None:
@@ -300,7 +304,7 @@ def _bundled(
     again = fit_catenary(moved, np.ones(len(moved)))
     if again is None:
         return single
-    return Wire(again, rows, covered, len(places))
+    return Wire(again, rows, covered, places - middle)
 
 
 def _prior(found: list[Wire]) -> Prior:

@@ -268,3 +268,20 @@ def test_a_conductor_that_crowns_hide_between_its_ends_is_one():
     assert_one_span(line, 6)
     assert sorted(c.seen for c in line.conductors) == pytest.approx([0.4] + [1.0] * 5, abs=0.05)
     assert [c.sag for c in line.conductors] == pytest.approx([wires[0].sag] * 6, abs=0.05)
+
+
+def test_a_conductor_knows_the_wires_of_its_bundle_in_its_own_direction():
+    """The second span was traced against the direction of its line."""
+    towers = [pole(1, 0.0), pole(2, 70.0, 40.0), pole(3, 68.0, 115.0)]
+    wires, offsets = [], ((0.15, 0.1), (-0.15, -0.1))
+    for first, last in pairwise(towers):
+        way = (last.place - first.place) / np.hypot(*(last.place - first.place))
+        left = np.array([-way[1], way[0]])
+        for beside, above in offsets:
+            ends = [(*(tower.place + beside * left), 114.0 + above) for tower in (first, last)]
+            wires.append(Catenary(*ends, 700.0))
+    line = line_of(towers, wires, step=0.3)
+    assert [(c.from_tower, c.to_tower) for c in line.conductors] == [(1, 2), (2, 3)]
+    for conductor in line.conductors:
+        assert conductor.subconductors == 2
+        np.testing.assert_allclose(sorted(conductor.offsets), sorted(offsets), atol=0.03)

@@ -34,7 +34,7 @@ def test_wires_side_by_side_are_told_apart():
     wires = trace_wires(np.concatenate([points_on(wire, 1.0, rng) for wire in true]))
     assert len(wires) == len(true)
     assert max(nearest(wires, wire) for wire in true) < 0.03
-    assert {wire.bundle for wire in wires} == {1}
+    assert {len(wire.offsets) for wire in wires} == {1}
 
 
 @pytest.mark.parametrize("places", BUNDLES, ids=len)
@@ -42,7 +42,7 @@ def test_a_bundle_is_one_wire_with_its_number(places):
     rng = np.random.default_rng(0)
     parts = [points_on(hung(5.0 + t, 25.0 + z), 1.0, rng) for t, z in places]
     (wire,) = trace_wires(np.concatenate(parts))
-    assert wire.bundle == len(places)
+    assert len(wire.offsets) == len(places)
     t, z = (np.array(places).min(axis=0) + np.array(places).max(axis=0)) / 2
     assert nearest([wire], hung(5.0 + t, 25.0 + z)) < 0.03
     assert wire.fit.rmse < 0.06

@@ -33,10 +33,10 @@ def span(number: int, **changed) -> LineSpan:
 def conductor(number: int, **changed) -> Conductor:
     curve = Catenary((100.0 * number, 0.0, 20.0), (100.0 * number + 100, 0.0, 20.0), 900.0)
     known = Conductor(
-        catenary=curve, tube=0.25, span_id=number, conductor_id=1, kind="conductor",
-        subconductors=1, from_tower=number, to_tower=number + 1, c=900.0, sag=curve.sag,
-        blowout=0.0, length=100.0, rmse=0.03, points=500, seen=1.0, from_z=20.0, to_z=20.0,
-        from_height=18.0, to_height=18.0,
+        catenary=curve, tube=0.25, offsets=((0.0, 0.0),), span_id=number, conductor_id=1,
+        kind="conductor", subconductors=1, from_tower=number, to_tower=number + 1, c=900.0,
+        sag=curve.sag, blowout=0.0, length=100.0, rmse=0.03, points=500, seen=1.0,
+        from_z=20.0, to_z=20.0, from_height=18.0, to_height=18.0,
     )  # fmt: skip
     return replace(known, **changed)
 

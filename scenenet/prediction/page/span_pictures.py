@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.clearance.kinds import HOUSE, ON_GROUND, PLANT
-from scenenet.clearance.section import Area, look_around, on_wires, sections
+from scenenet.clearance.section import Area, look_around, sections
 from scenenet.clearance.settings import ClearanceSettings
+from scenenet.clearance.touching import AIR, on_wires
 from scenenet.core.progress import track
 from scenenet.line.frame import SpanFrame
 from scenenet.line.records import Conductor, LineSpan
@@ -140,7 +141,7 @@ def _parts(
     free = everything.part == FREE
     of_tower = everything.part == TOWER
     wire = ~free & ~of_tower
-    wire[free] = on_wires(everything.xyz[free], own)
+    wire[free] = on_wires(everything.xyz[free], own) > AIR
     return [
         *(np.compress(kind == number, xyz, axis=0) for number in (ON_GROUND, PLANT, HOUSE)),
         everything.xyz[wire],

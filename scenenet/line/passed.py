@@ -25,6 +25,10 @@ in a dip bend conductors less than others."""
 MEETS_M = 2 * BEND_WIRE_M
 """m, distance of the ends of one conductor at a tower, cut at the plane of its crossarms."""
 
+ARM = 0.5
+"""Share of its height beyond which a pole holds no conductor: its crossarms, if any, are shorter.
+What is as slim as a pole amid wider lines is a tree."""
+
 
 class _End(NamedTuple):
     """The end of a conductor at a tower.
@@ -45,7 +49,9 @@ class _End(NamedTuple):
 def passed_towers(towers: Sequence[LineTower], conductors: Sequence[Conductor]) -> set[int]:
     """Ids of the towers that conductors pass without a bend, as they pass a tree.
 
-    A pole may be as slim as no tree is, and short spans bend little, so poles are none of them.
+    A pole may be as slim as no tree is, and short spans bend little: in a dip, poles bend their
+    conductors no more than a tree does. So they are none of them, unless they would hold conductors
+    further away than ``ARM`` allows.
 
     Args:
         towers: of the survey.
@@ -58,9 +64,15 @@ def passed_towers(towers: Sequence[LineTower], conductors: Sequence[Conductor]) 
     return {
         tower.id
         for tower in towers
-        if (tower.width is None or tower.width > POLE_M)
+        if (tower.width is None or tower.width > POLE_M or _too_far(tower, at[tower.id]))
         and max(_bends(at[tower.id]), default=np.inf) <= PASSED
     }
+
+
+def _too_far(tower: LineTower, ends: Sequence[_End]) -> bool:
+    """Whether a conductor ends further from a tower than a pole of its height holds one."""
+    apart = (float(np.linalg.norm(end.xyz[:2] - tower.place)) for end in ends)
+    return max(apart, default=0.0) > ARM * tower.height
 
 
 def _add_ends(at: Mapping[int, list[_End]], conductor: Conductor) -> None:

@@ -18,19 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from scenenet.core.errors import InputError
-from scenenet.core.scratch import scratch_folder
-from scenenet.detection.settings import DetectionSettings
-from scenenet.experiments.wire_options import wire_parser
+from scenenet.experiments.synthetic_wires import every_point, look, two_digits
+from scenenet.experiments.wire_options import add_kinds, print_table, wire_parser
 from scenenet.metrics.voxel_scores import Confusion
-from scenenet.models.model_file import read_model
-from scenenet.pointcloud.reading import read
-from scenenet.prediction.predict import predict_survey
-from scenenet.prediction.settings import PredictSettings
-from scenenet.synthetic.codes import CONDUCTOR
 from scenenet.synthetic.corridor import Corridor
 from scenenet.synthetic.settings import SyntheticSettings
-from scenenet.synthetic.survey import make_survey
 
 DISTANCES_M = (0.0, 3.0, 6.0, 9.0, 15.0)
 """m, distances from the axis of the nearest tower between which points are counted together."""
@@ -74,25 +66,20 @@ def cases(kinds: Sequence[str], towers: int, seed: int) -> Iterator[SyntheticSet
             seed += 1
 
 
-def look(settings: SyntheticSettings, wires: Path, folder: Path) -> Found:
+def look_at_towers(settings: SyntheticSettings, wires: Path, folder: Path) -> Found:
     """Make a survey, and compare the points that the model finds with the truth.
 
     Raises:
         InputError: the model cannot be used.
     """
-    name = f"seed {settings.seed}"
-    survey, true = folder / f"{settings.seed}.laz", folder / f"{settings.seed}.truth.laz"
-    make_survey(settings, survey, true, progress=f"{name}: survey made")
-    truth, (_, card) = read(true), read_model(wires)
-    with predict_survey(survey, wires, PredictSettings(), DetectionSettings()) as predicted:
-        found = np.asarray(predicted.look_up(truth.xyz).probability) >= card.tau
+    points = look(settings, [wires], folder)
+    (taken,) = points.taken
     axes = np.array([(tower.x, tower.y) for tower in Corridor(settings).towers])
-    away = np.min([np.hypot(*(truth.xyz[:, :2] - axis).T) for axis in axes], axis=0)
-    conductor = truth.classification == CONDUCTOR
+    away = np.min([np.hypot(*(points.xyz[:, :2] - axis).T) for axis in axes], axis=0)
     near = []
     for low, high in pairwise((*DISTANCES_M, np.inf)):
         here = (away >= low) & (away < high)
-        near.append(Confusion.of(found[here], conductor[here]))
+        near.append(Confusion.of(taken[here], points.true[here]))
     kind, *_ = settings.kinds
     return Found((kind, settings.bundle, settings.density, settings.tension > 0), tuple(near))
 
@@ -108,32 +95,25 @@ def table(found: Sequence[Found]) -> list[str]:
         kind, bundle, density, tension = row.of
         total = sum(row.near, Confusion())
         cells = [kind, f"{bundle}", f"{density:g}", "yes" if tension else "no"]
-        cells += [f"{_text(c.recall)}, {_text(c.precision)}" for c in row.near]
-        every = Confusion(tp=total.tp + total.fn, fp=total.fp + total.tn)
-        cells += [_text(total.iou_tower), _text(every.iou_tower)]
+        cells += [f"{two_digits(c.recall)}, {two_digits(c.precision)}" for c in row.near]
+        cells += [two_digits(total.iou_tower), two_digits(every_point(total).iou_tower)]
         lines.append(f"| {' | '.join(cells)} |")
     return lines
-
-
-def _text(score: float | None) -> str:
-    return "-" if score is None else f"{score:.2f}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; its exit status."""
     parser = wire_parser("wires_at_towers", __doc__)
+    add_kinds(parser)
     parser.add_argument("--towers", type=int, default=3, help="of each survey (default 3)")
     parser.add_argument("--seed", type=int, default=5, help="of the first survey (default 5)")
     chosen = parser.parse_args(arguments)
-    try:
-        with scratch_folder() as folder:
-            settings = cases(chosen.kinds, chosen.towers, chosen.seed)
-            found = [look(of, chosen.model, folder) for of in settings]
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    print("\n".join(table(found)))
-    return 0
+
+    def make(folder: Path) -> list[str]:
+        settings = cases(chosen.kinds, chosen.towers, chosen.seed)
+        return table([look_at_towers(of, chosen.model, folder) for of in settings])
+
+    return print_table(make)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from scenenet.experiments.wires_at_towers import DENSITIES, POLES, Found, cases, look, table
+from scenenet.experiments.wires_at_towers import (
+    DENSITIES,
+    POLES,
+    Found,
+    cases,
+    look_at_towers,
+    table,
+)
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.packaged import WIRES, packaged_model
 
@@ -12,7 +19,7 @@ from scenenet.models.packaged import WIRES, packaged_model
 def test_wires_at_a_pole_are_found_and_scored_by_distance(tmp_path):
     carrying, tension = cases(["tubular"], 1, 5)
     assert (carrying.tension, tension.tension, tension.seed) == (0, 1, 6)
-    found = look(carrying, packaged_model(WIRES), tmp_path)
+    found = look_at_towers(carrying, packaged_model(WIRES), tmp_path)
     assert found.of == ("tubular", 1, POLES["density"], False)
     wires = [near.tp + near.fn for near in found.near]
     # Points end 14 m from the axis.

@@ -15,11 +15,9 @@ from pathlib import Path
 from typing import Any
 
 from scenenet.clearance.settings import ClearanceSettings
-from scenenet.core.errors import InputError
-from scenenet.core.scratch import scratch_folder
 from scenenet.detection.settings import DetectionSettings
 from scenenet.experiments.line_truth import clearances, conductors
-from scenenet.experiments.wire_options import wire_parser
+from scenenet.experiments.wire_options import add_kinds, print_table, wire_parser
 from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.reading import read
 from scenenet.prediction.predict import predict_survey
@@ -74,6 +72,7 @@ def run(
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; its exit status."""
     parser = wire_parser("line_truth", __doc__)
+    add_kinds(parser)
     parser.add_argument("--towers", type=int, default=24, help="towers of a line (default 24)")
     parser.add_argument("--seed", type=int, default=5, help="of the surveys (default 5)")
     parser.add_argument("--voltage", type=float, default=66, help="kV, of the limits (default 66)")
@@ -85,26 +84,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "(default 0)",
     )
     chosen = parser.parse_args(arguments)
-    try:
-        with scratch_folder() as folder:
-            found = [
-                run(
-                    kind,
-                    chosen.towers,
-                    chosen.seed,
-                    chosen.model,
-                    chosen.voltage,
-                    folder,
-                    chosen.tension,
-                )
-                for kind in chosen.kinds
-            ]
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
-    lines, near = zip(*found, strict=True)
-    print("\n".join([*conductors.table(lines), "", *clearances.table(near)]))
-    return 0
+    how = chosen.towers, chosen.seed, chosen.model, chosen.voltage
+
+    def make(folder: Path) -> list[str]:
+        found = [run(kind, *how, folder, chosen.tension) for kind in chosen.kinds]
+        lines, near = zip(*found, strict=True)
+        return [*conductors.table(lines), "", *clearances.table(near)]
+
+    return print_table(make)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,13 +14,16 @@ from scenenet.baselines.voxel_features import voxel_features
 from scenenet.core.progress import track
 from scenenet.dataset.crops import CropClouds
 from scenenet.dataset.split import crops_in
-from scenenet.dataset.voxel_cache import load
+from scenenet.dataset.voxel_cache import Dataset, load
 from scenenet.dataset.voxels import VoxelSample, median_voxel_size
 from scenenet.detection.settings import DetectionSettings
-from scenenet.evaluation.answers import Answering, no_answer, rules_on
+from scenenet.evaluation.answers import Answering, Predict, no_answer, points_on, rules_on
+from scenenet.evaluation.result import Evaluation
 from scenenet.evaluation.scoring import score_predictions
+from scenenet.metrics.threshold_choice import best_step
 from scenenet.metrics.threshold_curve import ThresholdCurve
-from scenenet.models.settings import BOOSTED_TREES
+from scenenet.models.settings import BOOSTED_TREES, boosted_trees_of
+from scenenet.pointcloud.targets import Target
 
 
 def evaluate_boosted_trees(
@@ -45,33 +48,95 @@ def evaluate_boosted_trees(
     from scenenet.core.peak_memory import used
     from scenenet.evaluation.inference_time import CROPS, milliseconds
 
-    parts = {
-        part: load(voxel_manifests, crops_in(split, part))
-        for part in ("train", "validation", "test")
-    }
+    parts = _parts(voxel_manifests, split)
     clouds, size = CropClouds(crop_manifests), median_voxel_size(parts["train"].samples)
     grown, seconds = _grow(parts["train"].samples, seeds)
     models = [
         tune(model, curve)
         for model, curve in zip(grown, _curves(grown, parts["validation"].samples), strict=True)
     ]
-    test = parts["test"].samples
-    found = {sample.id: known for sample, known in zip(test, _of_each(models, test), strict=True)}
-    for number, (model, seed, out) in enumerate(zip(models, seeds, outs, strict=True)):
+
+    def answering(model: BoostedTrees, predict: Predict) -> Answering:
+        """Towers are found in voxels of another size, which are predicted on their own."""
+        if not crop_manifests:
+            return no_answer
+        return rules_on(clouds, model.probabilities, model.threshold(), size, detection)
+
+    for out, scores in zip(
+        outs, _scored(BOOSTED_TREES, models, parts["test"], answering), strict=True
+    ):
+        write_json(out, scores.to_json())
+    timed = sorted(parts["test"].samples, key=lambda sample: sample.id)[:CROPS]
+    inference_ms = {str(max(timed[0].grid.shape)): milliseconds(models[0].probabilities, timed)}
+    write_json(out_times, {"training_seconds": seconds, "inference_ms": inference_ms} | used())
+
+
+def evaluate_trees_of_observer(
+    observer: str,
+    target: Target,
+    false_weight: float,
+    voxel_manifests: Sequence[str | Path],
+    crop_manifests: Sequence[str | Path],
+    split: str | Path,
+    seed: int,
+    out: str | Path,
+) -> None:
+    """Train boosted trees for the target of an observer, on its squares; tune and score them on
+    squares as the observer: by points in voxels at or above tau.
+
+    Args:
+        observer: its name.
+        false_weight: what a false voxel counts where tau is chosen, as for the observer
+            (``metric.false_weight``).
+        voxel_manifests, crop_manifests: of the stores of voxels, and of the squares they are of.
+        out: JSON file: the result of ``score_predictions``, with ``parameters``.
+    """
+    from scenenet.core.files import write_json
+
+    parts = _parts(voxel_manifests, split)
+    clouds = CropClouds(crop_manifests)
+    (grown,), _ = _grow(parts["train"].samples, [seed])
+    (curve,) = _curves([grown], parts["validation"].samples)
+    step, _ = best_step(curve, false_weight)
+    model = replace(grown, tau=float(curve.tau[step]))
+
+    def answering(model: BoostedTrees, predict: Predict) -> Answering:
+        return points_on(clouds, predict, model.threshold(), target)
+
+    (scores,) = _scored(boosted_trees_of(observer), [model], parts["test"], answering)
+    write_json(out, replace(scores, target=target.text).to_json())
+
+
+def _parts(voxel_manifests: Sequence[str | Path], split: str | Path) -> dict[str, Dataset]:
+    return {
+        part: load(voxel_manifests, crops_in(split, part))
+        for part in ("train", "validation", "test")
+    }
+
+
+def _scored(
+    name: str,
+    models: Sequence[BoostedTrees],
+    test: Dataset,
+    answering: Callable[[BoostedTrees, Predict], Answering],
+) -> Iterator[Evaluation]:
+    """The scores of each model on the test part.
+
+    Args:
+        name: of the models in their results.
+        answering: the answer of a model for a crop, which may use its predictions.
+    """
+    samples = test.samples
+    known = zip(samples, _of_each(models, samples), strict=True)
+    found = {sample.id: of_each for sample, of_each in known}
+    for number, model in enumerate(models):
 
         def predict(sample: VoxelSample, number: int = number) -> tuple[np.ndarray, np.ndarray]:
             return sample.spread(found[sample.id][number])
 
-        tau = model.threshold()
-        answer: Answering = no_answer
-        if crop_manifests:
-            answer = rules_on(clouds, model.probabilities, tau, size, detection)
-        scores = score_predictions(BOOSTED_TREES, seed, tau, predict, parts["test"], answer)
-        scores = replace(scores, part="test", parameters=model.n_parameters())
-        write_json(out, scores.to_json())
-    timed = sorted(test, key=lambda sample: sample.id)[:CROPS]
-    inference_ms = {str(max(timed[0].grid.shape)): milliseconds(models[0].probabilities, timed)}
-    write_json(out_times, {"training_seconds": seconds, "inference_ms": inference_ms} | used())
+        answer, tau = answering(model, predict), model.threshold()
+        scores = score_predictions(name, model.seed, tau, predict, test, answer)
+        yield replace(scores, part="test", parameters=model.n_parameters())
 
 
 def _grow(

@@ -115,8 +115,9 @@ class Config(Settings):
     tuning: TuningSettings = TuningSettings()
     boosted_trees: bool = Field(
         True,
-        description="train and score boosted trees beside the models, as a baseline; "
-        "cross-validation, `components` and `label_noise` compare with boosted trees in any case",
+        description="train and score boosted trees beside the models and the observers, as a "
+        "baseline; cross-validation, `components` and `label_noise` compare with boosted trees in "
+        "any case",
     )
     score_towers: bool = Field(
         True,

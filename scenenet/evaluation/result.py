@@ -47,6 +47,7 @@ class PointScores:
     Attributes:
         precision, recall, iou: of the points with a tower id; None as for voxels.
         n_true, n_predicted: number of tower points, and of points with a tower id.
+        n_points: number of all points.
     """
 
     precision: float | None
@@ -54,6 +55,12 @@ class PointScores:
     iou: float | None
     n_true: int
     n_predicted: int
+    n_points: int
+
+    @property
+    def of_every_point(self) -> PointScores:
+        """Of the trivial answer for the same points, that each of them is the target."""
+        return PointScores.of(Confusion(tp=self.n_true, fp=self.n_points - self.n_true))
 
     @classmethod
     def of(cls, counts: Confusion) -> PointScores:
@@ -63,6 +70,7 @@ class PointScores:
             iou=counts.iou_tower,
             n_true=counts.tp + counts.fn,
             n_predicted=counts.tp + counts.fp,
+            n_points=counts.tp + counts.fp + counts.fn + counts.tn,
         )
 
 

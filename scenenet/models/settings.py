@@ -40,6 +40,13 @@ LARGEST_LENGTH = 20.0
 
 BOOSTED_TREES = "boosted trees"
 """Name in tables of the model of ``scenenet.baselines.boosted_trees``."""
+
+
+def boosted_trees_of(observer: str) -> str:
+    """Name of the boosted trees that are trained beside an observer."""
+    return f"{BOOSTED_TREES} of {observer}"
+
+
 THESIS_GENEOS = ("cylinder", "arrow", "negative_sphere")
 
 Protocol = Literal["thesis", "operational"]

@@ -13,7 +13,7 @@ import pandas as pd
 from scenenet.detection.survey_tower import SurveyTower, read_towers
 from scenenet.evaluation.result import Evaluation
 from scenenet.interpretability.result import ModelCertificate
-from scenenet.models.settings import BOOSTED_TREES
+from scenenet.models.settings import BOOSTED_TREES, boosted_trees_of
 from scenenet.pointcloud.quality.report import SurveyReport
 from scenenet.prediction.summary import PredictionSummary
 from scenenet.results.interactive_crop import InteractiveCrop
@@ -60,6 +60,7 @@ class Results:
         experiments: names of the experiments of the run (``scenenet.experiments.registry``).
         predicts: the model that classifies surveys; None for the first SCENE-Net.
         observers: names of the models of other targets, each trained from the first seed.
+        observed: surveys that only these are trained on.
     """
 
     folder: Path
@@ -71,6 +72,7 @@ class Results:
     experiments: Sequence[str] = ()
     predicts: str | None = None
     observers: Sequence[str] = ()
+    observed: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "folder", Path(self.folder))
@@ -158,12 +160,18 @@ class Results:
     @cached_property
     def boosted_trees(self) -> list[SeedResult]:
         """The boosted trees, trained from each seed."""
-        paths = [self.folder / "boosted_trees" / f"seed-{seed}.json" for seed in self.seeds]
-        found = [(seed, p) for seed, p in zip(self.seeds, paths, strict=True) if p.exists()]
-        return [
-            SeedResult(BOOSTED_TREES, BOOSTED_TREES, seed, read_typed(path, Evaluation.from_json))
-            for seed, path in found
-        ]
+        found = [self._trees(BOOSTED_TREES, ".", seed) for seed in self.seeds]
+        return [trees for trees in found if trees is not None]
+
+    def trees_of_observer(self, name: str) -> SeedResult | None:
+        """The boosted trees trained beside an observer; None if they were not."""
+        return self._trees(boosted_trees_of(name), name, self.seeds[0]) if self.seeds else None
+
+    def _trees(self, model: str, folder: str, seed: int) -> SeedResult | None:
+        path = self.folder / "boosted_trees" / folder / f"seed-{seed}.json"
+        if not path.exists():
+            return None
+        return SeedResult(model, BOOSTED_TREES, seed, read_typed(path, Evaluation.from_json))
 
     def study_runs(self, study: str) -> pd.DataFrame | None:
         """The runs of a study, a row per variant and seed; None if it was not run."""
@@ -189,8 +197,9 @@ class Results:
         return read_table(path) if path.exists() else None
 
     def checks(self) -> dict[str, SurveyReport]:
-        """The check report of each survey, including those that are only classified."""
-        surveys = dict.fromkeys([*self.surveys, *self.predicted])
+        """The check report of each survey, including those that only observers are trained on and
+        those that are only classified."""
+        surveys = dict.fromkeys([*self.surveys, *self.observed, *self.predicted])
         return self._each(
             surveys, "check", "report.json", lambda path: read_typed(path, SurveyReport.from_json)
         )

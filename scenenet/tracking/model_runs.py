@@ -29,8 +29,8 @@ def model_groups(
     pictures: Sequence[Picture] = (),
     study: str = "reproduction",
 ) -> list[RunGroup]:
-    """One parent per model, the boosted trees and the observers included, with a nested run per
-    seed.
+    """One parent per model, the boosted trees, the observers and the trees beside these included,
+    with a nested run per seed.
 
     Args:
         results: the result folder.
@@ -43,14 +43,16 @@ def model_groups(
     base = {"study": study, "dataset": dataset, "protocol": protocol}
     groups = []
     trainings = {model: results.of_model(model) for model in results.models}
-    observed = {
-        name: [found] for name in results.observers if (found := results.observer(name)) is not None
-    }
-    others = {BOOSTED_TREES: results.boosted_trees, **observed}
-    for model, trained in (trainings | others).items():
+    beside: dict[str, list[SeedResult]] = {BOOSTED_TREES: results.boosted_trees}
+    observed = {}  # name of the model -> observer whose squares it has
+    for name in results.observers:
+        for found in (results.observer(name), results.trees_of_observer(name)):
+            if found is not None:
+                beside[found.model], observed[found.model] = [found], name
+    for model, trained in (trainings | beside).items():
         if not trained:
             continue
-        split = f"square_split/{model}" if model in observed else "split"
+        split = f"square_split/{observed[model]}" if model in observed else "split"
         source = (results.folder / split / "split.csv").as_posix()
         own = (settings or {}).get(model, {})
         key = f"{study}/{dataset}/{model}"

@@ -63,6 +63,7 @@ def shares(predicted: np.ndarray, true: np.ndarray) -> dict[str, float | int]:
         "iou": both / (predicted | true).sum(),
         "n_true": int(true.sum()),
         "n_predicted": int(predicted.sum()),
+        "n_points": len(true),
     }
 
 
@@ -112,7 +113,9 @@ def test_without_truth_there_is_no_score_against_it(line, call):
     done = call("evaluate", line.survey, "--model", line.model, *LABELLED)
     result = json.loads(done.out)
     assert result["truth"] is None and result["labels_against_truth"] is None
-    assert set(result["points"]) == {"precision", "recall", "iou", "n_true", "n_predicted"}
+    assert set(result["points"]) == {
+        "precision", "recall", "iou", "n_true", "n_predicted", "n_points"
+    }  # fmt: skip
 
 
 def test_the_text_leads_with_the_truth_and_names_both(line, call):
@@ -137,6 +140,7 @@ def test_undefined_scores_of_points_are_null(call, pole_model, scene, tmp_path):
     assert done.code == 0, done.err
     result = json.loads(done.out)
     nothing = {"precision": None, "recall": None, "iou": None, "n_true": 0, "n_predicted": 0}
+    nothing["n_points"] = len(cloud.xyz)
     assert result["points"] == result["truth"]["points"] == nothing
     assert result["labels_against_truth"] == nothing
     assert result["truth"]["towers"]["n_true"] == result["truth"]["voxel"]["n_samples"] == 0

@@ -87,6 +87,7 @@ def test_points_at_or_above_tau_are_scored_and_no_towers(files, call):
         "iou": pytest.approx(both / (taken | labelled).sum()),
         "n_true": int(labelled.sum()),
         "n_predicted": int(taken.sum()),
+        "n_points": len(taken),
     }
     assert (scores["target"], scores["towers"], scores["voxel_towers"]) == ("pole=15", None, None)
     assert scores["voxel"] == scores["voxel_observer"]

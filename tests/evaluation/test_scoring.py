@@ -290,9 +290,15 @@ def test_points_of_crops_are_summed_against_labels_and_truth():
         Given(pole(5), pole(5)), CARD, dataset,
         lambda sample: replace(nothing(sample), points=points[sample.id]),
     )  # fmt: skip
-    assert found.points == PointScores(4 / 10, 4 / 9, 4 / 15, n_true=9, n_predicted=10)
-    assert found.truth.points == PointScores(3 / 5, 1.0, 3 / 5, n_true=3, n_predicted=5)
-    assert found.labels_against_truth == PointScores(3 / 9, 1.0, 3 / 9, n_true=3, n_predicted=9)
+    assert found.points == PointScores(4 / 10, 4 / 9, 4 / 15, n_true=9, n_predicted=10, n_points=45)
+    assert found.truth.points == PointScores(
+        3 / 5, 1.0, 3 / 5, n_true=3, n_predicted=5, n_points=20
+    )
+    assert found.labels_against_truth == PointScores(
+        3 / 9, 1.0, 3 / 9, n_true=3, n_predicted=9, n_points=20
+    )
+    trivial = found.points.of_every_point
+    assert (trivial.precision, trivial.recall, trivial.iou) == (9 / 45, 1.0, 9 / 45)
     assert [s.points.n_predicted for s in found.per_sample] == [5, 5]
     assert found.per_sample[1].points.recall is None  # nothing is labelled
 

@@ -237,6 +237,25 @@ def test_a_survey_without_towers_says_so(page: Path, results: Results, thesis: T
     assert "No tower was found in fresh." in read(page).text
 
 
+def test_surveys_that_only_observers_see_are_listed_with_their_use(
+    page: Path, results: Results, thesis: Thesis
+):
+    for name in ("south", "fresh"):
+        check = read_json(results.folder / "check/north/report.json")
+        (results.folder / "check" / name).mkdir()
+        write_json(
+            results.folder / "check" / name / "report.json", {**check, "warnings": [f"of {name}"]}
+        )
+    found = replace(results, observed=["south"])
+    write_report(found, thesis, page)
+    table = read(page).text.partition("Every survey of the run.")[2]
+    uses = re.findall(r"(north|south|fresh)\s+(training of observers|training|classified)", table)
+    assert uses == [
+        ("north", "training"), ("south", "training of observers"), ("fresh", "classified")
+    ]  # fmt: skip
+    assert "of south" in table
+
+
 def test_a_survey_with_lines_has_its_spans_and_its_worst_clearances(
     results: Results, thesis: Thesis, tmp_path: Path
 ):
@@ -255,6 +274,7 @@ def test_a_survey_with_lines_has_its_spans_and_its_worst_clearances(
     write_report(found, thesis, tmp_path / "page.html")
     page = read(tmp_path / "page.html")
     text = page.text
+    assert "boosted trees" in text and "every point" in text
     assert {"lines", "observers"} <= {each.get("id") for each in page.all("section")}
     assert AS_FLOWN.capitalize() in text
     assert "The first 10 of 12 spans." in text

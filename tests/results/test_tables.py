@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from fixtures.result_folder import with_observer
+from fixtures.result_folder import with_observer, with_truth
 
 from scenenet.core.errors import InputError
 from scenenet.evaluation.result import Scores
@@ -124,6 +124,7 @@ def test_scores_against_the_truth_have_columns_of_their_own(results: Results, th
     path = results.folder / "evaluate" / "scenenet" / "seed-1.json"
     record = json.loads(path.read_text())
     points = {"precision": 0.5, "recall": None, "iou": 0.25, "n_true": 0, "n_predicted": 9}
+    points["n_points"] = 90
     truth = {name: record[name] for name in Scores.__dataclass_fields__}
     truth |= {
         "voxel": record["voxel"] | {"f05": 0.125},
@@ -159,13 +160,33 @@ def test_an_observer_has_a_row_of_its_own_and_none_among_the_models(
 ):
     assert tables.observers(results, thesis).empty
     found = with_observer(results)
-    [row] = tables.observers(found, thesis).to_dict("records")
+    row, trees, trivial = tables.observers(found, thesis).to_dict("records")
     assert (row["observer"], row["target"], row["seed"]) == ("wires", "wire", 0)
     scores = found.seed("scenenet", 0).evaluation
     assert row["voxel_iou_tower"] == scores.voxel.iou_tower
     assert row["squares"] == scores.voxel.n_samples
     assert row["parameters"] == read_model(found.folder / "models/wires.json")[0].n_parameters()
-    assert "wires" not in set(tables.models(found, thesis)["model"])
+    assert (trees["observer"], trees["model"], trees["parameters"]) == (
+        "wires", "boosted trees", 3000
+    )  # fmt: skip
+    assert (trivial["observer"], trivial["model"]) == ("wires", "every point")
+    assert not {"wires", "boosted trees"} & set(tables.models(found, thesis)["model"])
+
+
+def test_an_observer_stands_beside_the_answer_that_every_point_is_the_target(
+    results: Results, thesis: Thesis
+):
+    table = tables.observers(with_truth(with_observer(results)), thesis)
+    trivial = row(table, model="every point")
+    assert (trivial["truth_point_recall"], trivial["truth_point_iou"]) == (1, 0.1)
+    assert trivial["point_n_predicted"] == 700 and trivial["truth_point_precision"] == 0.1
+    assert math.isnan(trivial["voxel_iou_tower"])
+
+
+def test_an_observer_without_boosted_trees_has_its_row(results: Results, thesis: Thesis):
+    found = with_observer(results)
+    (results.folder / "boosted_trees/wires/seed-0.json").unlink()
+    assert list(tables.observers(found, thesis)["model"]) == ["scenenet", "every point"]
 
 
 def test_training_time_is_the_sum_of_the_epochs(results: Results, thesis: Thesis):

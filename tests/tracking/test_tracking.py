@@ -265,12 +265,20 @@ def test_the_boosted_trees_have_runs_like_the_models(logged):
 
 def test_an_observer_has_a_run_whose_tag_says_what_it_finds(results):
     groups = model_groups(with_observer(results), "corridors")
-    assert len(groups) == len(model_groups(results, "corridors")) + 1
+    assert len(groups) == len(model_groups(results, "corridors")) + 2
     group = next(g for g in groups if g.parent.tags["model"] == "wires")
     [run] = group.children
     assert (run.tags["target"], group.parent.tags["target"]) == ("wire", "wire")
     assert run.datasets[0].source.endswith("square_split/wires/split.csv")
     assert run.artifacts.keys() == {"model/wires.json"}
+
+
+def test_the_boosted_trees_beside_an_observer_have_a_run_of_their_own(results):
+    groups = model_groups(with_observer(results), "corridors")
+    group = next(g for g in groups if g.parent.tags["model"] == "boosted trees of wires")
+    [run] = group.children
+    assert (run.tags["kind"], run.tags["target"]) == (BOOSTED_TREES, "wire")
+    assert run.metrics["test_precision"] == 0.8
 
 
 def test_logging_again_keeps_every_run(settings, client, one_model, tmp_path):

@@ -229,7 +229,7 @@ def _same_models(whole: Project, killed: Project) -> str | None:
 
 def _same_scores(whole: Project, killed: Project) -> str | None:
     names = ("models", "seeds", "parameters", "tower_scores", "towers", "whole_towers", "classes")
-    patterns = ("tune/**/seed-?.json", "evaluate/**/seed-?.json", "boosted_trees/seed-?.json",
+    patterns = ("tune/**/seed-?.json", "evaluate/**/seed-?.json", "boosted_trees/**/seed-?.json",
                 "split/*.csv", "towers/*/*.csv", "certificate/*.json")  # fmt: skip
     return _same((*patterns, *(f"tables/{name}.csv" for name in names)), whole, killed)
 

@@ -15,7 +15,10 @@ from scenenet.models.model_file import read_model
 pytestmark = pytest.mark.workflow
 
 MODEL = "results/packaged/wires.json"
+TREES = "results/boosted_trees/wires/seed-0.json"
+MADE = (MODEL, TREES)
 TRAINED = {"train_observer": 1, "tune_observer": 1, "evaluate_observer": 1, "packaged_wires": 1}
+GROWN = {"observer_trees": 1}
 SQUARES = {"squares": 2, "square_voxels": 2, "square_split": 1}
 
 
@@ -30,7 +33,7 @@ def made(project_in, project_root: Path, tmp_path_factory) -> Project:
     (project.folder / "config" / "surveys.tsv").write_text("survey\tpath\tcodes\trole\n")
     for name, role in (("first", "train"), ("second", "observe")):
         project.add_row(name, f"{{results_dir}}/synthetic/{name}.laz", "edp", role)
-    project.run("--cores", "1", MODEL)
+    project.run("--cores", "1", *MADE)
     return project
 
 
@@ -49,6 +52,34 @@ def test_it_finds_wires_and_is_scored_on_squares_that_it_has_not_seen(made):
     assert scores["towers"] is None
 
 
+def test_boosted_trees_learn_from_the_same_squares_and_are_scored_on_the_same(made):
+    trees, observer = (read_json(made.results / of) for of in (
+        "boosted_trees/wires/seed-0.json", "evaluate/wires/seed-0.json"
+    ))  # fmt: skip
+    assert (trees["model"], trees["target"]) == ("boosted trees of wires", "wire")
+    for against in ("truth", None):
+        one, other = (scores[against] if against else scores for scores in (trees, observer))
+        assert [s["id"] for s in one["per_sample"]] == [s["id"] for s in other["per_sample"]]
+        assert one["points"]["n_true"] == other["points"]["n_true"]
+        assert one["points"]["n_points"] == other["points"]["n_points"]
+        assert one["points"]["recall"] > 0.3 and one["points"]["precision"] > 0.3
+    assert trees["parameters"] > 1000
+
+
+def test_without_boosted_trees_an_observer_has_none_beside_it(made):
+    table = "results/tables/observers.csv"
+    assert "boosted_trees" in made.planned(table)
+    made.configure({"boosted_trees": False})
+    assert not {"boosted_trees", "observer_trees"} & set(made.planned(table))
+    assert made.snakemake("-n", TREES).returncode != 0
+    made.configure({"boosted_trees": True})
+
+
+def test_the_report_shows_every_survey_that_observers_see(made):
+    planned = made.planned("results/report/index.html")
+    assert (planned["check"], planned["survey_map"], planned["tower_map"]) == (2, 2, 1)
+
+
 def test_its_card_has_the_points_that_it_found(made):
     card = (made.results / "packaged" / "wires.md").read_text(encoding="utf-8")
     truth = read_json(made.results / "evaluate/wires/seed-0.json")["truth"]["points"]
@@ -61,17 +92,20 @@ def test_models_of_towers_do_not_see_the_surveys_of_observers(made):
 
 
 def test_what_runs_again_is_what_depends_on_a_change(made):
-    assert made.planned(MODEL) == {}
+    assert made.planned(*MADE) == {}
     made.add_row("own", "{results_dir}/synthetic/third.laz", "edp", "new")
-    assert made.planned(MODEL) == {}
+    assert made.planned(*MADE) == {}
     observer = {"name": "wires", "target": "wire", "voxel_size": 1}
     made.configure({"observers": [{**observer, "changes": {"search.starts": 3}}]})
-    assert made.planned(MODEL) == TRAINED
+    assert made.planned(*MADE) == TRAINED
+    equal = {"search.starts": 2, "metric.false_weight": 0.25}
+    made.configure({"observers": [{**observer, "changes": equal}]})
+    assert made.planned(*MADE) == {**TRAINED, **GROWN}
     usual = {**observer, "changes": {"search.starts": 2}}
     shares = {"train": 0.5, "validation": 0.2, "test": 0.3, "stretch": 1}
     made.configure({"observers": [{**usual, "split": shares}]})
-    assert made.planned(MODEL) == {"square_split": 1, **TRAINED}
+    assert made.planned(*MADE) == {"square_split": 1, **TRAINED, **GROWN}
     made.configure(
         {"observers": [{**observer, "changes": {"search.starts": 2}, "square": {"edge": 40}}]}
     )
-    assert made.planned(MODEL) == {**SQUARES, **TRAINED}
+    assert made.planned(*MADE) == {**SQUARES, **TRAINED, **GROWN}

@@ -54,7 +54,7 @@ rule survey_map:
     benchmark:
         f"{R}/benchmarks/survey_map/{{survey}}.tsv"
     wildcard_constraints:
-        survey=any_of(filter(has_map, TRAIN)),
+        survey=any_of(filter(has_map, OBSERVE)),
     priority: 1
     conda:
         "../envs/scenenet.yaml"

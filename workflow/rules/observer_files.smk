@@ -13,8 +13,8 @@ def grid_of(w):
     return OBSERVED[w.observer].grid().model_dump(mode="json")
 
 
-def split_of(w):
-    own = OBSERVED[w.observer].split
+def split_of(observer):
+    own = OBSERVED[observer].split
     return SETTINGS["split"] if own is None else own.model_dump(mode="json")
 
 

@@ -87,8 +87,8 @@ rule square_split:
     params:
         job=lambda w: job(
             "square_split",
-            split_of(w),
-            seed=split_of(w)["seed"],
+            split_of(w.observer),
+            seed=split_of(w.observer)["seed"],
             observer=w.observer,
             target=finds(w),
         ),
@@ -194,3 +194,39 @@ rule evaluate_observer:
         "Scoring the observer {wildcards.observer} on the test squares"
     script:
         "../scripts/evaluate.py"
+
+
+if settings.boosted_trees:
+
+    rule observer_trees:
+        input:
+            stores=square_voxels_of("store"),
+            manifests=square_voxels_of("manifest"),
+            crop_stores=squares_of("store"),
+            crops=squares_of("manifest"),
+            split=f"{R}/square_split/{{observer}}/split.csv",
+        output:
+            scores=f"{R}/boosted_trees/{{observer}}/seed-{SEED}.json",
+            provenance=f"{R}/boosted_trees/{{observer}}/seed-{SEED}.provenance.json",
+        log:
+            f"{R}/logs/observer_trees/{{observer}}.log",
+        benchmark:
+            f"{R}/benchmarks/observer_trees/{{observer}}.tsv"
+        conda:
+            "../envs/scenenet.yaml"
+        threads: 1
+        resources:
+            mem_mb=3000,
+            runtime=120,
+        params:
+            job=lambda w: job(
+                "observer_trees",
+                {"false_weight": OBSERVED[w.observer].model().metric.false_weight},
+                seed=SEED,
+                observer=w.observer,
+                target=finds(w),
+            ),
+        message:
+            "Training and scoring the boosted trees beside {wildcards.observer} (baseline)"
+        script:
+            "../scripts/observer_trees.py"

@@ -18,6 +18,7 @@ rule tables:
         observers=[
             *every("tune_observer", "model"),
             *every("evaluate_observer", "scores"),
+            *of_boosted_trees("scores", "observer_trees"),
         ],
         studies=[*every("join_study", "runs"), *every("join_study", "times")],
         experiments=[*every("join_runs", "runs"), *every("join_runs", "times")],

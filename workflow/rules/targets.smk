@@ -42,9 +42,10 @@ def every_written_tile(w):
     ]
 
 
-def of_boosted_trees(output):
-    """An output of the boosted trees; nothing where they are not trained."""
-    return every("boosted_trees", output) if settings.boosted_trees else []
+def of_boosted_trees(output, stage="boosted_trees"):
+    """An output of the boosted trees, or of those beside the observers (stage ``observer_trees``); nothing where
+    they are not trained."""
+    return every(stage, output) if settings.boosted_trees else []
 
 
 def of_study(study, output):
@@ -135,6 +136,7 @@ def results_of(
     experiments=(),
     predicts=None,
     observers=(),
+    observed=(),
 ):
     """The arguments of ``scenenet.results.folder.Results`` besides its folder. Models are pairs, because their
     order counts and that of a dict does not survive in a parameter."""
@@ -148,6 +150,7 @@ def results_of(
         "experiments": list(experiments),
         "predicts": predicts,
         "observers": list(observers),
+        "observed": list(observed),
     }
 
 
@@ -158,6 +161,7 @@ def all_results():
         experiments=EXPERIMENTS,
         predicts=settings.predict.model,
         observers=VALUES["observer"],
+        observed=[survey for survey in OBSERVE if not trained_on(survey)],
     )
 
 

@@ -52,6 +52,7 @@ rule track:
             *every("tune_observer", "tuning"),
             *every("tune_observer", "model"),
             *every("evaluate_observer", "scores"),
+            *of_boosted_trees("scores", "observer_trees"),
         ],
     output:
         runs=f"{R}/mlflow/runs.json",
@@ -80,7 +81,7 @@ rule track:
                 observer.name: {
                     "voxels": observer.grid().model_dump(mode="json"),
                     "square": observer.square.model_dump(mode="json"),
-                    "split": SETTINGS["split"],
+                    "split": split_of(observer.name),
                 }
                 for observer in settings.observers
             },

@@ -9,12 +9,13 @@ import pandas as pd
 from scenenet.pointcloud.quality.report import SurveyReport
 from scenenet.report.blocks import Block, Column, Notes, Section, Table, table
 from scenenet.report.context import ReportContext
+from scenenet.results.folder import Results
 
 
 def data(context: ReportContext) -> Section | None:
     """Surveys and Table 5.1."""
     checks = context.results.checks()
-    blocks: list[Block] = [_survey_list(checks)] if checks else []
+    blocks: list[Block] = [_survey_list(checks, context.results)] if checks else []
     for survey, report in checks.items():
         if report.warnings:
             blocks.append(Notes(f"Warnings of the check of {survey}", report.warnings))
@@ -35,7 +36,7 @@ def data(context: ReportContext) -> Section | None:
             "the shares can agree only if the surveys are similar."
         )
         blocks.append(table(classes, columns, caption, "tables/classes.csv"))
-    for survey in context.results.surveys:
+    for survey in (*context.results.surveys, *context.results.observed):
         blocks += context.figures_of(survey, "data")
     blocks += context.figures("data")
     return Section("data", "The surveys", blocks) if blocks else None
@@ -111,22 +112,29 @@ def voxels(context: ReportContext) -> Section | None:
     return Section("voxels", "Voxels", blocks) if blocks else None
 
 
-def _survey_list(checks: Mapping[str, SurveyReport]) -> Table:
+def _survey_list(checks: Mapping[str, SurveyReport], results: Results) -> Table:
+    uses = dict.fromkeys(results.predicted, "classified")
+    uses |= dict.fromkeys(results.observed, "training of observers")
+    uses |= dict.fromkeys(results.surveys, "training")
     columns = [
         Column("survey", "survey"),
+        Column("use", "used for"),
         Column("n_points", "points", "count"),
         Column("area_m2", "area [m²]", "count"),
         Column("density_per_m2", "points per m²", "share"),
         Column("crs", "CRS"),
         Column("codes", "class codes"),
     ]
-    facts = [{"survey": name} | {c.name: getattr(report.facts, c.name) for c in columns[1:]}
-             for name, report in checks.items()]  # fmt: skip
+    facts = [
+        {"survey": name, "use": uses[name]}
+        | {column.name: getattr(report.facts, column.name) for column in columns[2:]}
+        for name, report in checks.items()
+    ]
     frame = pd.DataFrame(facts).fillna({"crs": "none", "codes": "not given"})
     return table(
         frame,
         columns,
-        "Every survey of the run: training data and surveys that are only classified.",
+        "Every survey of the run. Models of towers do not see those that observers are trained on.",
     )
 
 

@@ -55,6 +55,7 @@ def observers(context: ReportContext) -> Section | None:
     scores = [Column(f"point_{name}", label, how) for name, label, how in POINT_COLUMNS]
     columns = [
         Column("observer", "observer"),
+        Column("model", "model"),
         Column("target", "finds"),
         Column("parameters", "parameters", "count"),
         Column("squares", "test squares", "count"),
@@ -63,7 +64,8 @@ def observers(context: ReportContext) -> Section | None:
     ]
     caption = (
         "Observers: a point counts as found if its voxel reaches tau. They were trained on squares "
-        "of the training surveys, and scored on other squares of these."
+        "of the training surveys, and scored on other squares of these. Boosted trees learn from "
+        "the same squares; every point is the trivial answer, that each point is the target."
     )
     return Section("observers", "Observers", [table(frame, columns, caption, _file("observers"))])
 

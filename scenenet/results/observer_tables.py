@@ -10,8 +10,8 @@ from scenenet.evaluation.result import PointScores, Scores
 from scenenet.experiments.published import Thesis
 from scenenet.metrics.score_columns import POINT_SCORES, TOWER_ONLY_SCORES, TRUTH
 from scenenet.results.folder import Results
-from scenenet.results.seed_result import SeedResult
 from scenenet.results.score_tables import n_parameters
+from scenenet.results.seed_result import SeedResult
 
 EVERY_POINT = "every point"
 """Name of the trivial answer."""

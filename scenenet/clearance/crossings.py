@@ -17,6 +17,10 @@ SAMPLE_M = 1.0
 REFINED = 8
 """Times that the steps around the nearest place become finer, by a factor of ten in two."""
 
+ON_POLE_M = 2.5
+"""m from the axis of a tower up to which a cable is held there: poles hold cables without a
+crossarm, and some by a short one. Others pass the tower."""
+
 
 @dataclass(frozen=True)
 class Crossing:
@@ -38,7 +42,8 @@ class Crossing:
 
 def crossings(line: SurveyLine, reach: float) -> Iterator[Crossing]:
     """For each conductor of a line, the nearest wire of each other span within ``reach`` m, in the
-    order of the conductors. Wires of the same line, and those that share a tower, do not cross."""
+    order of the conductors. Wires of the same line, and those that share a tower, do not cross. A
+    cable does where it passes the tower that it seems to end at."""
     spans = {span.span_id: span for span in line.spans}
     wires = line.conductors
     if not wires:
@@ -52,7 +57,7 @@ def crossings(line: SurveyLine, reach: float) -> Iterator[Crossing]:
         found: dict[int, Crossing] = {}
         for number in np.flatnonzero(near).tolist():
             other = wires[number]
-            if not _apart(spans[wire.span_id], spans[other.span_id]):
+            if not _apart(spans[wire.span_id], spans[other.span_id], other):
                 continue
             u, v, distance = nearest_places(wire.catenary, other.catenary)
             known = found.get(other.span_id)
@@ -61,12 +66,20 @@ def crossings(line: SurveyLine, reach: float) -> Iterator[Crossing]:
         yield from found.values()
 
 
-def _apart(own: LineSpan, other: LineSpan) -> bool:
-    """Whether two spans are of different lines."""
-    if own.span_id == other.span_id or (own.line == other.line and own.line):
+def _apart(own: LineSpan, other: LineSpan, wire: Conductor) -> bool:
+    """Whether two spans are of different lines, or ``wire`` of the other one is a cable that passes
+    their towers."""
+    if own.span_id == other.span_id:
         return False
-    towers = {own.from_tower, own.to_tower} & {other.from_tower, other.to_tower}
-    return not towers - {0}
+    towers = {own.from_tower, own.to_tower} - {0}
+    ends = [
+        (wire.catenary.start, other.start if other.from_tower in towers else None),
+        (wire.catenary.end, other.end if other.to_tower in towers else None),
+    ]
+    away = [np.hypot(x - foot[0], y - foot[1]) for (x, y, _), foot in ends if foot is not None]
+    if wire.kind == "cable" and away:
+        return min(away) > ON_POLE_M
+    return not away and not (own.line == other.line and own.line)
 
 
 def nearest_places(first: Catenary, second: Catenary) -> tuple[float, float, float]:

@@ -229,6 +229,28 @@ def test_a_wire_of_another_line_is_an_obstacle_and_one_of_the_own_line_is_not():
     assert set(rows) == {1, 2}  # a cable of no line is an obstacle only
 
 
+@pytest.mark.parametrize(("beside", "crosses"), [(0.3, False), (7.0, True)])
+def test_a_cable_that_passes_its_tower_is_an_obstacle_and_one_on_the_pole_is_not(beside, crosses):
+    own = Catenary((0.0, 0.0, 16.0), (70.0, 0.0, 16.0), 900.0)
+    cable = Catenary((0.0, beside, 12.0), (36.0, beside, 12.0), 250.0)
+    places = [np.array([x, 0.0]) for x in (0.0, 36.0, 70.0)]
+    wire, held = wire_of(own, 1, 1), wire_of(cable, 2, 1, "cable")
+    line = SurveyLine(
+        (
+            span_of(1, 1, [places[0], places[2]], 5, 6),
+            span_of(2, 0, places[:2], 5, 0),
+        ),
+        (replace(wire, from_tower=5, to_tower=6), replace(held, from_tower=5)),
+        (),
+    )
+    level = np.random.default_rng(1).uniform((-30, -60, 0), (100, 60, 0.05), (10_000, 3))
+    found = find_clearances(
+        line, lambda area: SectionPoints(level[area.has(level)]), ClearanceSettings(voltage=66)
+    )
+    wires = [place.other_span for place in found.places if place.kind == "wire"]
+    assert wires == ([2] if crosses else [])
+
+
 def test_a_voltage_without_limits_is_refused(corridor):
     xyz, codes, line = corridor
     with pytest.raises(InputError, match="750 kV"):

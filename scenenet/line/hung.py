@@ -118,6 +118,8 @@ def traced(
     frame: SpanFrame,
     rise: float = 0.0,
     gap: float = GAP_M,
+    *,
+    doubtful: bool = False,
 ) -> tuple[HungWire, ...]:
     """The wires among some points, each between its first and its last point. Points that are not
     certain count where other wires of the span show that wires hang there, and in steep spans.
@@ -129,18 +131,19 @@ def traced(
         rows: (n,) of the points.
         frame: of the span.
         rise, gap: of the span, as in ``trace_wires``.
+        doubtful: whether points that are not certain count everywhere.
     """
-    question = frame.x, frame.y, *frame.direction.tolist(), frame.length, rise, gap
+    question = frame.x, frame.y, *frame.direction.tolist(), frame.length, rise, gap, doubtful
     key = hashlib.sha256(repr(question).encode() + rows.tobytes()).digest()
     if key not in points.answers:
-        points.answers[key] = tuple(_traced(points, rows, frame, rise, gap))
+        points.answers[key] = tuple(_traced(points, rows, frame, rise, gap, doubtful))
     return points.answers[key]
 
 
 def _traced(
-    points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float, gap: float
+    points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float, gap: float, doubtful: bool
 ) -> Iterator[HungWire]:
-    certain = points.certain[rows]
+    certain = points.certain[rows] | doubtful
     stz = frame.to_frame(points.xyz[rows])
     wires = trace_wires(stz[certain], rise, gap)
     number = np.flatnonzero(certain)
@@ -148,8 +151,8 @@ def _traced(
         wires, number = trace_wires(stz, rise, gap), np.arange(len(stz))
     elif wires and not certain.all():
         above = np.array([wire.fit.catenary.residuals(stz)[1] for wire in wires])
-        doubtful = ~certain & (above.max(axis=0) > -BELOW_M) & (above.min(axis=0) < ABOVE_M)
-        number = np.flatnonzero(certain | doubtful)
+        beside = ~certain & (above.max(axis=0) > -BELOW_M) & (above.min(axis=0) < ABOVE_M)
+        number = np.flatnonzero(certain | beside)
         wires = trace_wires(stz[number], rise, gap)
     for wire in wires:
         catenary = wire.fit.catenary

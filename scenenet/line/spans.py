@@ -9,6 +9,7 @@ import numpy as np
 from scenenet.core.progress import track
 from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M, SHORTEST_SPAN_M
 from scenenet.line.frame import SpanFrame
+from scenenet.line.graph import STRAY
 from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.lone_wires import lone_spans
 from scenenet.line.trace import GAP_M
@@ -47,23 +48,33 @@ def find_spans(
     A crane beside the line, or a mast under it, may be nearer than the next tower. So a tower that
     stands beside all of the wires, or next to a much taller one, takes those that no other does.
 
+    Where no wire is certain between two towers of a line, doubtful points count if they show that
+    the line goes on there.
+
     Args:
         progress: label of the progress on stderr; None shows no progress.
     """
     free = np.ones(len(points), bool)
     found: list[TracedSpan] = []
     doubtful: list[tuple[LineTower, LineTower]] = []
+    without: list[tuple[LineTower, LineTower]] = []
     low = _next_to_taller(towers)
     pairs = list(_pairs(points, towers))
     for first, last in pairs if progress is None else track(pairs, progress):
         span = _span(points, free, found, first, last)
-        if span is not None and any(t.id in low or _beside(t, span.wires) for t in (first, last)):
+        if span is None:
+            without.append((first, last))
+        elif any(t.id in low or _beside(t, span.wires) for t in (first, last)):
             doubtful.append((first, last))
-        elif span is not None:
+        else:
             _add(span, found, free)
     for first, last in doubtful:
         span = _span(points, free, found, first, last)
         if span is not None:
+            _add(span, found, free)
+    for first, last in without:
+        span = _span(points, free, found, first, last, doubtful=True)
+        if span is not None and _goes_on(found, span):
             _add(span, found, free)
     return found + lone_spans(points, free, towers)
 
@@ -81,6 +92,8 @@ def _span(
     found: Sequence[TracedSpan],
     first: LineTower,
     last: LineTower,
+    *,
+    doubtful: bool = False,
 ) -> TracedSpan | None:
     """The span between two towers, among points that are ``free`` (N,); None if there is none."""
     frame = SpanFrame.between(first.place, last.place)
@@ -91,9 +104,19 @@ def _span(
     rows = points.beside(frame, REACH_M)
     rise = (last.base - first.base) / frame.length
     gap = max(GAP_M, 2 * UNSEEN_SHARE * frame.length)
-    wires = traced(points, rows[free[rows]], frame, rise, gap)
+    wires = traced(points, rows[free[rows]], frame, rise, gap, doubtful=doubtful)
     wires = tuple(_between(wires, frame, first, last))
     return TracedSpan(first, last, frame, wires) if wires else None
+
+
+def _goes_on(found: Sequence[TracedSpan], span: TracedSpan) -> bool:
+    """Whether both towers of a span hold about as many wires in another one, so that a line goes on
+    with it."""
+    for tower in (span.start, span.end):
+        held = [len(each.wires) for each in found if tower is each.start or tower is each.end]
+        if not held or len(span.wires) < STRAY * max(held):
+            return False
+    return True
 
 
 def _next_to_taller(towers: Sequence[LineTower]) -> set[int]:

@@ -161,6 +161,26 @@ def test_points_that_are_not_certain_help_beside_those_that_are(poles):
     assert errors(line, poles)[0, 0] < 0.05
 
 
+@pytest.mark.parametrize(("seen", "found"), [(3, True), (1, False)])
+def test_a_line_goes_on_with_points_that_are_not_certain_if_they_show_enough_conductors(
+    poles, seen, found
+):
+    first, last = poles.towers[2:4]
+    own = [c for c in poles.inner if {c.from_tower, c.to_tower} == {first.id, last.id}]
+    certain, kept = np.ones(len(poles.xyz), bool), np.ones(len(poles.xyz), bool)
+    for number, conductor in enumerate(own):
+        s, _ = conductor.catenary.along(poles.xyz)
+        on = (s > 0) & (s < conductor.catenary.length)
+        certain &= ~on
+        if number >= seen:
+            kept &= ~(on & (np.hypot(*conductor.catenary.residuals(poles.xyz)) < 0.2))
+    points = WirePoints(poles.xyz[kept], certain[kept])
+    line = find_line(points, poles.towers, poles.to_its_ends)
+    between = [s for s in line.spans if {s.from_tower, s.to_tower} == {first.id, last.id}]
+    assert [span.conductors for span in between] == ([len(own)] if found else [])
+    assert [note.what for note in line.notes] == ([] if found else [UNTRACED])
+
+
 def test_nothing_is_found_where_there_is_nothing(poles):
     empty = replace(poles.points, xyz=np.empty((0, 3)), certain=np.empty(0, bool))
     line = find_line(empty, poles.towers, poles.to_its_ends)

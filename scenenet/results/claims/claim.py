@@ -42,7 +42,8 @@ class Claim:
         skilled: F0.5 by seed of the models that must detect towers for the claim to mean anything,
             by what they are; a model without skill proves nothing about skill. Empty for claims
             about times, starts and labels.
-        study: study whose findings explain a claim that does not hold; None for none.
+        study: study that the claim is about; its findings explain a claim that does not hold. None
+            for none.
         timed: whether it is about times, which differ between two equal runs.
     """
 
@@ -75,6 +76,8 @@ def judge(claim: Claim, evidence: Evidence) -> Judged:
     """
     found = claim.measure(evidence)
     if found is None:
+        if claim.study is not None and not evidence.has_study(claim.study):
+            return Judged(claim, None, OPEN, f"This run has no study {claim.study}.")
         needed = " and ".join(what for what, _ in claim.skilled)
         seen = f", or no seed of {needed} detects anything" if needed else ""
         return Judged(claim, None, OPEN, f"Not measured in this run{seen}.")

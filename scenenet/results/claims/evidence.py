@@ -63,6 +63,10 @@ class Evidence:
         name = representative(self.results, kind)
         return [] if name is None else self.results.of_model(name)
 
+    def has_study(self, study: str) -> bool:
+        """Whether the run has results of a study."""
+        return self._study(study) is not None
+
     def study(self, study: str, variant: str, column: str) -> pd.Series:
         """A column of the trainings of a variant of a study."""
         runs = self._study(study)

@@ -126,7 +126,7 @@ def measure(
         scheme: of their class codes; None where heights say what they are.
         limits: for the voltage; None without one.
     """
-    around = look_around(area, flown, points, scheme, settings.few_points)
+    around = look_around(area, flown, points, scheme, settings.few_points, touching=True)
     here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
     xyz, kind = np.compress(here, around.xyz, axis=0), around.kind[here]
     last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)
@@ -146,13 +146,16 @@ def look_around(
     points: PointsIn,
     scheme: ClassScheme | None,
     few_points: int,
+    *,
+    touching: bool = False,
 ) -> Surroundings:
     """What the points in a section and around it are, without those of wires.
 
     Args:
-        wires: whose points are left out, but for those that hang together with vegetation.
+        wires: whose points are left out.
         points, scheme: as ``measure``.
         few_points: of ``ClearanceSettings``.
+        touching: whether those stay that may be of a wire and hang together with vegetation.
     """
     wide = Area(area.frame, area.first - AROUND_M, area.last + AROUND_M, area.half_width)
     found = points(wide)
@@ -163,6 +166,8 @@ def look_around(
         free[doubtful] = ~untraced(area.frame.to_frame(found.xyz[doubtful]))
     codes = None if found.codes is None else found.codes[free]
     around = surroundings(np.compress(free, found.xyz, axis=0), codes, scheme, few_points)
+    if not touching:
+        return around
     close = own == MAY_BE
     codes = None if found.codes is None else found.codes[close]
     return with_touching(around, found.xyz[close], codes, scheme)

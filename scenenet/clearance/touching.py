@@ -51,20 +51,29 @@ def _lowest(conductor: Conductor) -> float:
 def _on_wires(xyz: np.ndarray, conductors: Sequence[Conductor]) -> np.ndarray:
     """What ``on_wires`` gives, of points of which most are as high as conductors."""
     found = np.zeros(len(xyz), np.int8)
+    # Conductors of a span are nearly parallel, so that along the first one most points are beside
+    # the box around another.
+    frame = conductors[0].catenary
+    s, t = frame.along(xyz)
+    z = np.ascontiguousarray(xyz[:, 2])
     for conductor in conductors:
         curve, reach = conductor.catenary, conductor.tube + OWN_M
-        low = _lowest(conductor)
-        near = np.flatnonzero((xyz[:, 2] >= low) & (found < OWN))
-        s, t = curve.along(xyz[near])
-        along = (s >= -reach) & (s <= curve.length + reach)
-        near = near[along & (np.abs(t) <= reach + abs(curve.blowout))]
-        left, above = curve.residuals(xyz[near])
+        around = 2 * (reach + abs(curve.blowout))
+        ends = frame.along(np.array([curve.start, curve.end]))
+        near = (z >= _lowest(conductor)) & (found < OWN)
+        for value, end in zip((t, s), (ends[1], ends[0]), strict=True):
+            near &= (value >= end.min() - around) & (value <= end.max() + around)
+        rows = np.flatnonzero(near)
+        along, beside = curve.along(xyz[rows])
+        inside = (along >= -reach) & (along <= curve.length + reach)
+        rows = rows[inside & (np.abs(beside) <= reach + abs(curve.blowout))]
+        left, above = curve.residuals(xyz[rows])
         inside = np.hypot(left, above) <= reach
-        near, left, above = near[inside], left[inside], above[inside]
+        rows, left, above = rows[inside], left[inside], above[inside]
         wires = np.array(conductor.offsets)
         apart = np.hypot(left[:, None] - wires[:, 0], above[:, None] - wires[:, 1])
         own = apart.min(axis=1) <= max(WIRE_M, WIRE_RMSE * conductor.rmse)
-        found[near] = np.maximum(found[near], np.where(own, OWN, MAY_BE))
+        found[rows] = np.maximum(found[rows], np.where(own, OWN, MAY_BE))
     return found
 
 
@@ -90,15 +99,18 @@ def with_touching(
         known = np.full(len(xyz), BY_HEIGHT, np.int8)
     if not len(xyz):
         return around
-    low, high = xyz.min(axis=0) - TOUCH_M, xyz.max(axis=0) + TOUCH_M
-    stands = np.isin(around.kind, (PLANT, HOUSE)) & ~around.lone
-    stands &= ((around.xyz >= low) & (around.xyz <= high)).all(axis=1)
-    tree = cKDTree(around.xyz[stands])
+    # Most points are below them.
+    rows = np.flatnonzero(around.xyz[:, 2] >= xyz[:, 2].min() - TOUCH_M)
+    rows = rows[np.isin(around.kind[rows], (PLANT, HOUSE))]
+    for axis in range(2):
+        place, low, high = around.xyz[rows, axis], xyz[:, axis].min(), xyz[:, axis].max()
+        rows = rows[(place >= low - TOUCH_M) & (place <= high + TOUCH_M)]
+    tree = cKDTree(around.xyz[rows])
     touching = tree.query_ball_point(xyz, TOUCH_M, return_length=True) >= around.few
     if not touching.any():
         return around
     xyz, known = xyz[touching], known[touching]
-    kind = np.where(known == BY_HEIGHT, around.kind[stands][tree.query(xyz)[1]], known)
+    kind = np.where(known == BY_HEIGHT, around.kind[rows[tree.query(xyz)[1]]], known)
     return replace(
         around,
         xyz=np.concatenate((around.xyz, xyz)),

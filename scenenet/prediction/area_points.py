@@ -104,12 +104,6 @@ class AreaLookUp:
             np.concatenate(codes) if self._classes else None,
         )
 
-    def free(self, area: Area) -> SectionPoints:
-        """The points in an area that belong to no tower, and are in no voxel of a wire."""
-        found = self.all(area)
-        found = found.at(found.part == FREE)
-        return SectionPoints(found.xyz, found.codes)
-
     def obstacles(self, area: Area) -> SectionPoints:
         """The points in an area that belong to no tower, nor to its jumpers and strings."""
         found = self.all(area)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenenet.clearance.kinds import HOUSE, ON_GROUND, PLANT
-from scenenet.clearance.section import Area, look_around, sections
+from scenenet.clearance.section import Area, SectionPoints, look_around, sections
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.clearance.touching import AIR, on_wires
 from scenenet.core.progress import track
@@ -134,10 +134,19 @@ def _parts(
 ) -> list[np.ndarray]:
     """The points (n, 3) m in a section that are each of ``PICTURED``."""
     narrow = Area(area.frame, area.first, area.last, half_width)
-    around = look_around(area, own, points.free, prediction.scheme, few_points)
+    looked_at = []
+
+    def free_points(wide: Area) -> SectionPoints:
+        """The points around the section that belong to nothing; they are looked up once."""
+        found = points.all(wide)
+        looked_at.append(found.at(narrow.has(found.xyz)))
+        free = found.at(found.part == FREE)
+        return SectionPoints(free.xyz, free.codes)
+
+    around = look_around(area, own, free_points, prediction.scheme, few_points)
+    [everything] = looked_at
     inside = narrow.has(around.xyz)
     xyz, kind = np.compress(inside, around.xyz, axis=0), around.kind[inside]
-    everything = points.all(narrow)
     free = everything.part == FREE
     of_tower = everything.part == TOWER
     wire = ~free & ~of_tower

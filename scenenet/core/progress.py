@@ -62,6 +62,16 @@ def track(items: Iterable[Item], label: str, total: int | None = None) -> Iterat
     print(f"{label}: done ({done})", file=sys.stderr, flush=True)
 
 
+def track_if(items: Iterable[Item], label: str | None) -> Iterable[Item]:
+    """``items``, with their progress if there is a label."""
+    return items if label is None else track(items, label)
+
+
+def labelled(start: str | None, what: str) -> str | None:
+    """The label of a stage of work; None if no progress is shown."""
+    return None if start is None else f"{start}: {what}"
+
+
 def _duration(seconds: float) -> str:
     """A time in the unit in which it is a number of one or two digits."""
     for unit, size in (("h", 3600.0), ("min", 60.0)):

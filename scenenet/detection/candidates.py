@@ -10,6 +10,7 @@ import numba
 import numpy as np
 
 from scenenet.core.compilation import EXACT
+from scenenet.core.progress import track_if
 from scenenet.detection.settings import DetectionSettings
 
 SURROUNDINGS_M = 28.0
@@ -24,20 +25,49 @@ MEAN_SHIFTS = 5
 small."""
 
 
+PROBED = 50_000
+"""Columns whose neighbours are looked up at once: their lists take 20 MB."""
+
+
 class DetectedVoxels:
-    """Detected voxels (V, 3) m, with search by position in plan."""
+    """Detected voxels (V, 3) m, with search by position in plan.
+
+    A long survey has millions: each takes some 30 bytes here, and its column about 100.
+
+    Attributes:
+        offset: (3,) m, the lowest x, y and z; all positions here are relative to it.
+        voxel_size: m.
+        z: (V,) m, of their centres.
+        probability: (V,).
+        columns: (C, 2) m, the positions in plan that have one, by x, then y.
+    """
 
     def __init__(self, centres: np.ndarray, probability: np.ndarray, voxel_size: float) -> None:
+        """Sort the voxels by column.
+
+        Args:
+            centres: (V, 3) m.
+            probability: (V,).
+            voxel_size: m.
+        """
         from scipy.spatial import cKDTree
 
-        self.centres, self.probability, self.voxel_size = centres, probability, voxel_size
-        self._weight = probability.astype(float)
-        self._weighted = centres[:, :2] * self._weight[:, None]
-        self.columns, column_of = np.unique(centres[:, :2], axis=0, return_inverse=True)
-        column_of = column_of.reshape(-1)
-        self._by_column = np.argsort(column_of, kind="stable")
-        self._starts = np.append(0, np.cumsum(np.bincount(column_of)))
+        self.probability, self.voxel_size = probability, voxel_size
+        self.offset = centres.min(axis=0) if len(centres) else np.zeros(3)
+        self.z = centres[:, 2] - self.offset[2]
+        x, of_x = np.unique(centres[:, 0] - self.offset[0], return_inverse=True)
+        y, of_y = np.unique(centres[:, 1] - self.offset[1], return_inverse=True)
+        column = of_x.reshape(-1) * len(y) + of_y.reshape(-1)
+        del of_x, of_y
+        self._by_column = np.argsort(column, kind="stable").astype(np.int32)
+        numbers, count = np.unique(column, return_counts=True)
+        self._starts = np.append(0, np.cumsum(count))
+        self._column = np.searchsorted(numbers, column).astype(np.int32)
+        self.columns = np.column_stack([x[numbers // max(len(y), 1)], y[numbers % max(len(y), 1)]])
         self._tree = cKDTree(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.z)
 
     def columns_within(self, place: np.ndarray, radius: float) -> np.ndarray:
         """Columns (C,) within a planar radius in m of a position (2,) m, ascending."""
@@ -55,19 +85,23 @@ class DetectedVoxels:
 
     def mean(self, voxels: np.ndarray) -> np.ndarray:
         """(2,) m, mean position of voxels, weighted by their probabilities."""
-        return self._weighted[voxels].sum(axis=0) / self._weight[voxels].sum()
+        weight = self.probability[voxels].astype(float)
+        places = self.columns[self._column[voxels]]
+        return np.asarray((places * weight[:, None]).sum(axis=0) / weight.sum())
 
     def tallest_first(self) -> np.ndarray:
         """Columns by their number of detected levels, neighbouring columns included, highest
         first."""
-        level = np.rint(self.centres[:, 2] / self.voxel_size).astype(int)
+        level = np.rint(self.z / self.voxel_size).astype(np.int32)
         reach = 1.5 * self.voxel_size
-        adjacent = self._tree.query_ball_point(self.columns, reach, return_sorted=True)
         levels, total = np.empty(len(self.columns)), np.empty(len(self.columns))
-        for column, neighbours in enumerate(adjacent):
-            near = self._in_columns(np.array(neighbours, np.int64))
-            levels[column] = _n_distinct(level[near])
-            total[column] = self.probability[near].sum()
+        for first in range(0, len(self.columns), PROBED):
+            probed = self.columns[first : first + PROBED]
+            adjacent = self._tree.query_ball_point(probed, reach, return_sorted=True)
+            for column, neighbours in enumerate(adjacent, first):
+                near = self._in_columns(np.array(neighbours, np.int64))
+                levels[column] = _n_distinct(level[near])
+                total[column] = self.probability[near].sum()
         return np.lexsort((self.columns[:, 1], self.columns[:, 0], -total, -levels))
 
 
@@ -125,21 +159,27 @@ class DistinctPlaces:
 
 
 def axes(
-    detected: DetectedVoxels, settings: DetectionSettings, apart: float
+    detected: DetectedVoxels,
+    settings: DetectionSettings,
+    apart: float,
+    progress: str | None = None,
 ) -> Iterator[np.ndarray]:
     """Positions (2,) m where detected voxels are above one another.
 
     Axes with more levels come first, and each axis starts at least ``apart`` m from all before it.
+
+    Args:
+        progress: label of the progress on stderr; None shows no progress.
     """
     found = DistinctPlaces()
     taken = np.zeros(len(detected.columns), bool)
-    for column in detected.tallest_first():
+    for column in track_if(detected.tallest_first(), progress):
         if taken[column]:
             continue
         body, axis = _mean_shift(detected, detected.columns[column], settings.eps / 2)
         taken[detected.columns_within(axis, apart)] = True
         taken[column] = True
-        extent = np.ptp(detected.centres[body, 2]) + detected.voxel_size
+        extent = np.ptp(detected.z[body]) + detected.voxel_size
         if len(body) < settings.min_voxels or extent < settings.min_body:
             continue
         # The mean of neighbouring columns is often the same.

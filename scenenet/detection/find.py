@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from scenenet.core.progress import track
+from scenenet.core.progress import labelled, track_if
 from scenenet.detection.bends import pass_without_bend
 from scenenet.detection.candidates import SURROUNDINGS_M, DetectedVoxels
 from scenenet.detection.conductor_rules import (
@@ -35,11 +35,9 @@ AHEAD = 6
 
 
 def find_towers(
-    centres: np.ndarray,
-    probability: np.ndarray,
+    detected: DetectedVoxels,
     surroundings: Surroundings,
     points: Surroundings,
-    voxel_size: float,
     tau: float,
     settings: DetectionSettings,
     progress: str | None = None,
@@ -50,26 +48,22 @@ def find_towers(
     decide, so that the result hardly depends on where the borders of the voxels lie.
 
     Args:
-        centres: (V, 3) m, of the voxels with probability >= ``settings.threshold(tau)``.
-        probability: (V,).
+        detected: the voxels with probability >= ``settings.threshold(tau)``.
         surroundings: gives the occupied voxels around a position.
         points: gives the points around a position.
-        voxel_size: m.
         tau: threshold of the model.
-        progress: label of the progress on stderr; None shows no progress.
+        progress: start of the labels of the progress on stderr; None shows no progress.
     """
-    if len(centres) == 0:
+    if len(detected) == 0:
         return []
-    offset = centres.min(axis=0)
-    detected = DetectedVoxels(centres - offset, probability, voxel_size)
-    rough = rough_towers(detected, offset, surroundings, settings)
+    offset, voxel_size = detected.offset, detected.voxel_size
+    rough = rough_towers(detected, surroundings, settings, progress)
     conductors = ConductorPoints(points, HEAD * settings.min_height)
     measurement = _Measurement(surroundings, points, conductors, offset, voxel_size, tau, settings)
     found: list[MeasuredTower] = []
-    places = range(len(rough)) if progress is None else track(range(len(rough)), progress)
     for coming in rough[: AHEAD - 1]:
         measurement.expect(coming)
-    for i in places:
+    for i in track_if(range(len(rough)), labelled(progress, "candidates measured")):
         for coming in rough[i + AHEAD - 1 : i + AHEAD]:
             measurement.expect(coming)
         found += measurement.towers_near(rough[i])

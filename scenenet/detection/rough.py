@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenenet.core.progress import labelled, track_if
 from scenenet.detection.body import centre_body, measure_body
 from scenenet.detection.candidates import (
     SURROUNDINGS_M,
@@ -46,17 +47,21 @@ class RoughTower:
 
 def rough_towers(
     detected: DetectedVoxels,
-    offset: np.ndarray,
     surroundings: Surroundings,
     settings: DetectionSettings,
+    progress: str | None = None,
 ) -> list[RoughTower]:
-    """The rough towers at the axes of the detected voxels, relative to ``offset`` (3,) m.
+    """The rough towers at the axes of the detected voxels, relative to ``detected.offset``.
 
     Axes are half of ``settings.eps`` apart, so a tower may have several.
+
+    Args:
+        progress: start of the labels of the progress on stderr; None shows no progress.
     """
     found: list[RoughTower] = []
-    places = DistinctPlaces()
-    for axis in neighbours_adjacent(axes(detected, settings, settings.eps / 2)):
+    places, offset = DistinctPlaces(), detected.offset
+    searched = axes(detected, settings, settings.eps / 2, labelled(progress, "columns searched"))
+    for axis in track_if(neighbours_adjacent(searched), labelled(progress, "axes looked at")):
         around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
         tower = _measure(detected, axis, around, settings)
         if tower is not None and places.add(tower.x, tower.y):
@@ -75,7 +80,7 @@ def _measure(
     size, foot_radius = detected.voxel_size, settings.foot_radius
     min_height, min_upright = LOOSE * settings.min_height, LOOSE * settings.min_upright
     seen = detected.within(axis, settings.eps / 2)
-    body = measure_body(around, axis, detected.centres[seen, 2], foot_radius, size)
+    body = measure_body(around, axis, detected.z[seen], foot_radius, size)
     if body.height < min_height:
         return None
     # The reach of the crossarms follows from the height.
@@ -84,7 +89,7 @@ def _measure(
     axis, free = centre_body(around, axis, body, size)
     if not free:
         return None
-    body = measure_body(around, axis, detected.centres[seen, 2], foot_radius, size)
+    body = measure_body(around, axis, detected.z[seen], foot_radius, size)
     if body.height < min_height or body.upright < min_upright:
         return None
     peak = float(detected.probability[seen].max())

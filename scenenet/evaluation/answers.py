@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
+from scenenet.detection.candidates import DetectedVoxels
 from scenenet.detection.find import find_towers
 from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.settings import DetectionSettings
@@ -119,11 +120,9 @@ def with_rules(
     detected = of_occupied >= detection.threshold(tau)
     centres = seen.grid.centres(seen.index)
     towers = find_towers(
-        centres[detected],
-        of_occupied[detected],
+        DetectedVoxels(centres[detected], of_occupied[detected], voxel_size),
         surroundings_in(centres),
         surroundings_in(cloud.xyz),
-        voxel_size,
         tau,
         detection,
     )

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from scenenet.detection.candidates import DetectedVoxels
 from scenenet.detection.edge_distance import MAX_M, edge_distance
 from scenenet.detection.find import find_towers
 from scenenet.detection.measured_tower import MeasuredTower
@@ -99,7 +100,7 @@ def find_in_survey(search: TowerSearch, progress: str | None = None) -> FoundTow
     """Find the towers of a survey.
 
     Args:
-        progress: label of the progress on stderr; None shows no progress.
+        progress: start of the labels of the progress on stderr; None shows no progress.
     """
     threshold = search.settings.threshold(search.tau)
     return _find(search, *search.predictions.detected(search.spool, threshold), progress)
@@ -131,10 +132,8 @@ def _find(
     """The towers among voxels (``TilePredictions.detected``)."""
     spool = search.spool
     occupied, points = occupied_voxels(spool), survey_points(spool)
-    found = find_towers(
-        spool.centres(zyx), probability, occupied, points, spool.voxel_size, search.tau,
-        search.settings, progress,
-    )  # fmt: skip
+    detected = DetectedVoxels(spool.centres(zyx), probability, spool.voxel_size)
+    found = find_towers(detected, occupied, points, search.tau, search.settings, progress)
     numbers = tower_ids(np.array([(tower.x, tower.y) for tower in found]).reshape(-1, 2))
     shapes = (tower.structure for tower in found)
     structures = Structures(tuple(zip(numbers, shapes, strict=True)))

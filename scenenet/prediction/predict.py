@@ -104,8 +104,7 @@ def predict_survey(
         search = TowerSearch(joined.spool, tiles[0], joined.system.unit_sizes, tau, detection)
         if first.target.is_tower:
             if not folder.towers.exists():
-                label = f"{survey.given.name}: candidates measured"
-                write_json(folder.towers, find_in_survey(search, label).to_json())
+                write_json(folder.towers, find_in_survey(search, survey.given.name).to_json())
             found = FoundTowers.from_json(read_json(folder.towers))
         further = [
             FurtherModel(each, joined.spool_at(each.layer), predicted)

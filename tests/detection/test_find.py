@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenenet.detection.candidates import DetectedVoxels
 from scenenet.detection.find import find_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in
@@ -23,11 +24,9 @@ def find(xyz, feet, *, phase=(0.0, 0.0, 0.0), probability=0.9, height=15.0, **ch
         detected |= near & (level > 3) & (level < height)
     centres = occupied[detected]
     return find_towers(
-        centres,
-        np.full(len(centres), probability),
+        DetectedVoxels(centres, np.full(len(centres), probability), SIZE),
         surroundings_in(occupied),
         surroundings_in(xyz),
-        SIZE,
         TAU,
         DetectionSettings(**changes),
     )

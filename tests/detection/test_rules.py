@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from scenenet.detection.candidates import DetectedVoxels
 from scenenet.detection.find import find_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in
@@ -30,11 +31,11 @@ def detect(detected, around, probability=0.9, **changes):
     """The towers among points ``around`` with the voxels ``detected``."""
     occupied = np.unique(np.floor(around), axis=0) + 0.5
     return find_towers(
-        detected,
-        np.broadcast_to(np.asarray(probability, float), len(detected)),
+        DetectedVoxels(
+            detected, np.broadcast_to(np.asarray(probability, float), len(detected)), 1.0
+        ),
         surroundings_in(occupied),
         surroundings_in(around),
-        1.0,
         TAU,
         DetectionSettings(**changes),
     )

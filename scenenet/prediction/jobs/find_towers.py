@@ -42,7 +42,7 @@ def find_towers_of(
     joined = joined_work(survey, works)
     tiles = joined_predictions(joined, predictions)
     search = TowerSearch(joined.spool, tiles, joined.system.unit_sizes, tau, detection)
-    found = find_in_survey(search, f"{survey.name}: candidates measured")
+    found = find_in_survey(search, survey.name)
     write_json(towers, found.to_json())
 
     def reaching(work: WorkFile) -> Mapping[str, Any]:

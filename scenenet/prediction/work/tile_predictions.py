@@ -100,20 +100,20 @@ class TilePredictions:
     def detected(
         self, spool: TileSpool, threshold: float, codes: Iterable[int] | None = None
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The voxels with probability >= ``threshold``: lattice positions (V, 3), probability (V,)
-        and shares (V, K), in a fixed order.
+        """The voxels with probability >= ``threshold``: lattice positions (V, 3) int32,
+        probability (V,) and shares (V, K), in a fixed order.
 
         Args:
             codes: of the tiles to look at; None for all.
         """
-        zyx = [np.empty((0, 3), np.int64)]
+        zyx = [np.empty((0, 3), np.int32)]
         probability = [np.empty(0, np.float32)]
         shares = [np.empty((0, len(self.geneos)), np.float32)]
         for code in (code for code, _ in spool.places()) if codes is None else sorted(codes):
             prediction = self.read(code)
             found = prediction.probability >= threshold
             if found.any():
-                zyx.append(spool.tile(code).zyx()[found])
+                zyx.append(spool.tile(code).zyx()[found].astype(np.int32))
                 probability.append(prediction.probability[found])
                 shares.append(prediction.shares[found])
         return np.concatenate(zyx), np.concatenate(probability), np.concatenate(shares)

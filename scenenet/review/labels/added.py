@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from scenenet.detection.candidates import DetectedVoxels
 from scenenet.detection.conductor_rules import FAR, FURTHEST_M
 from scenenet.detection.find import find_towers
 from scenenet.detection.measured_tower import MeasuredTower
@@ -53,10 +54,11 @@ def measure_at(
         return None
     centres = (np.unique(np.floor(points / voxel_size), axis=0) + 0.5) * voxel_size
     apart = np.hypot(*(centres[:, :2] - place).T)
-    detected = centres[apart <= STRICT.eps / 2]
+    near_axis = centres[apart <= STRICT.eps / 2]
+    detected = DetectedVoxels(near_axis, np.ones(len(near_axis)), voxel_size)
     around = surroundings_in(centres), surroundings_in(points)
     for settings in (STRICT, LENIENT):
-        found = find_towers(detected, np.ones(len(detected)), *around, voxel_size, 0.5, settings)
+        found = find_towers(detected, *around, 0.5, settings)
         near = _nearest(place, found)
         if near is not None:
             return near

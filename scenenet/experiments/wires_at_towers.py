@@ -85,17 +85,17 @@ def look_at_towers(settings: SyntheticSettings, wires: Path, folder: Path) -> Fo
 
 
 def table(found: Sequence[Found]) -> list[str]:
-    """A Markdown table: recall, precision at each distance; IoU of all points, and of the answer
+    """A Markdown table: precision, recall at each distance; IoU of all points, and of the answer
     that every point is a conductor."""
     bands = [f"{low:g} to {high:g} m" for low, high in pairwise(DISTANCES_M)]
-    head = ["towers", "wires", "pulses per m2", "tension", *bands, f"from {DISTANCES_M[-1]:g} m",
-            "IoU", "every point: IoU"]  # fmt: skip
+    bands = [f"{band}: precision, recall" for band in (*bands, f"from {DISTANCES_M[-1]:g} m")]
+    head = ["towers", "wires", "pulses per m2", "tension", *bands, "IoU", "every point: IoU"]
     lines = [f"| {' | '.join(head)} |", "|---" * len(head) + "|"]
     for row in found:
         kind, bundle, density, tension = row.of
         total = sum(row.near, Confusion())
         cells = [kind, f"{bundle}", f"{density:g}", "yes" if tension else "no"]
-        cells += [f"{two_digits(c.recall)}, {two_digits(c.precision)}" for c in row.near]
+        cells += [f"{two_digits(c.precision)}, {two_digits(c.recall)}" for c in row.near]
         cells += [two_digits(total.iou_tower), two_digits(every_point(total).iou_tower)]
         lines.append(f"| {' | '.join(cells)} |")
     return lines

@@ -24,6 +24,7 @@ from scenenet.metrics.voxel_scores import Confusion
 from scenenet.synthetic.settings import SyntheticSettings
 
 FIRST_SEED = 14000
+OTHER_LINES: float = SyntheticSettings.model_fields["other_lines"].default
 
 PYLONS: Mapping[str, Any] = {
     "height": (24, 50), "span": 280, "span_spread": 30, "half_width": 30, "circuits": 2,
@@ -60,10 +61,14 @@ class Scored:
     found: tuple[Confusion, ...]
 
 
-def lines_of(first_seed: int) -> dict[str, SyntheticSettings]:
-    """Name -> settings of each line; the seeds are counted from the first."""
+def lines_of(first_seed: int, other_lines: float = OTHER_LINES) -> dict[str, SyntheticSettings]:
+    """Name -> settings of each line; the seeds are counted from the first.
+
+    Args:
+        other_lines: cables of other lines per km, which are no wires of this one in the truth.
+    """
     return {
-        name: SyntheticSettings(**own, seed=first_seed + number)
+        name: SyntheticSettings(**own, seed=first_seed + number, other_lines=other_lines)
         for number, (name, own) in enumerate(LINES.items())
     }
 
@@ -125,8 +130,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         metavar="LINE",
         help=f"some of {', '.join(LINES)} (default all)",
     )
+    parser.add_argument(
+        "--other-lines",
+        type=float,
+        default=OTHER_LINES,
+        metavar="PER_KM",
+        help="cables of other lines, which hang in the air as wires do and count as false: the "
+        f"truth has the wires of the line itself (default {OTHER_LINES:g} per km)",
+    )
     chosen = parser.parse_args(arguments)
-    wanted = {name: of for name, of in lines_of(chosen.seed).items() if name in chosen.lines}
+    made = lines_of(chosen.seed, chosen.other_lines)
+    wanted = {name: of for name, of in made.items() if name in chosen.lines}
 
     def make(folder: Path) -> list[str]:
         rows = [score(name, of, chosen.model, folder) for name, of in wanted.items()]

@@ -20,6 +20,8 @@ def test_each_line_has_a_seed_of_its_own_whichever_are_chosen():
     lines = lines_of(40)
     assert list(lines) == list(LINES)
     assert [of.seed for of in lines.values()] == list(range(40, 48))
+    assert {of.other_lines for of in lines.values()} == {14}
+    assert {of.other_lines for of in lines_of(40, 0).values()} == {0}
     pylons = [(*of.kinds, of.bundle) for name, of in lines.items() if name[-1].isdigit()]
     assert pylons == [("lattice", 1), ("lattice", 2), ("lattice", 4), ("window", 2), ("window", 1)]
 

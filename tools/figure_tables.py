@@ -197,6 +197,8 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
             ("wires",), partial(points_table, values, "wires", "recording")
         ),
         "figures of observers of conductors": printed("observers", "observers.txt", 0),
+        "figures of wires in surveys": printed("wires_in_surveys", "surveys.txt", 0),
+        "figures of wires without other lines": printed("wires_in_surveys", "alone.txt", 0),
         "figures of wires at towers": printed("wires_at_towers", "wires_at_towers.txt", 0),
         "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),

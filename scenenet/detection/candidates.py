@@ -55,9 +55,9 @@ class DetectedVoxels:
         self.probability, self.voxel_size = probability, voxel_size
         self.offset = centres.min(axis=0) if len(centres) else np.zeros(3)
         self.z = centres[:, 2] - self.offset[2]
-        x, of_x = np.unique(centres[:, 0] - self.offset[0], return_inverse=True)
-        y, of_y = np.unique(centres[:, 1] - self.offset[1], return_inverse=True)
-        column = of_x.reshape(-1) * len(y) + of_y.reshape(-1)
+        x, of_x = _ranked(centres[:, 0] - self.offset[0])
+        y, of_y = _ranked(centres[:, 1] - self.offset[1])
+        column = of_x * len(y) + of_y
         del of_x, of_y
         self._by_column = np.argsort(column, kind="stable").astype(np.int32)
         numbers, count = np.unique(column, return_counts=True)
@@ -134,6 +134,13 @@ def _n_distinct(values):  # pragma: no cover - compiled
             values[at] = value
             n += 1
     return n
+
+
+def _ranked(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The distinct ones of values (n,), ascending, and the rank (n,) of each: as
+    ``np.unique(..., return_inverse=True)``, which takes twice the memory."""
+    distinct = np.unique(values)
+    return distinct, np.searchsorted(distinct, values)
 
 
 class DistinctPlaces:

@@ -125,7 +125,9 @@ class Lattice:
 
     def centres(self, zyx: np.ndarray) -> np.ndarray:
         """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
-        return (zyx[:, ::-1] + 0.5) * self.voxel_size
+        centres = zyx[:, ::-1] + 0.5
+        centres *= self.voxel_size
+        return centres
 
     def corner(self, code: int) -> np.ndarray:
         """(3,) m, lowest x, y and z of a tile."""

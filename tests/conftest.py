@@ -15,7 +15,9 @@ from types import ModuleType
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
 # numba has threads of its own. While one of them waits for the others it would keep a core busy,
-# which takes most of the time of a small loop where another process has that core.
+# which takes most of the time of a small loop where another process has that core. Scikit-learn
+# shares the OpenMP of torch and these threads: its trees then take three times the processor time.
+os.environ.setdefault("GOMP_SPINCOUNT", "0")
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import hypothesis

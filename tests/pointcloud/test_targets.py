@@ -54,9 +54,9 @@ def test_equal_targets_have_one_text(text, name, canonical):
     [
         ("wires", "there is no target 'wires'. Choose tower, wire, vegetation, ground"),
         ("", "there is no target ''"),
-        ("256", "no list of class codes from 0 to 255"),
-        ("lamp=", "no list of class codes"),
-        ("lamp=14;16", "no list of class codes"),
+        ("256", "not a list of class codes from 0 to 255"),
+        ("lamp=", "not a list of class codes"),
+        ("lamp=14;16", "not a list of class codes"),
         ("tower=4", "the codes of target tower follow from the class scheme"),
         ("Lamp=14", "lower-case letters"),
         ("1,2,3,4,5,6,7,8,9,10", "more than the 32 of a LAS dimension"),

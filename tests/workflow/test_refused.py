@@ -36,7 +36,7 @@ def test_all_problems_of_the_sheet(project):
     project.add_row("other", "data/onw.laz", "edp", "new")
     message = short(project.refused())
     assert "config/surveys.tsv: 4 problems in the survey sheet" in message
-    assert "line 5: codes 'edpp' is none of" in message
+    assert "line 5: codes 'edpp' is not one of" in message
     assert "line 5: the name 'own' is on line 4 already" in message
     assert "line 6: data/onw.laz is not there, did you mean data/own.laz?" in message
 

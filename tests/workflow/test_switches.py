@@ -40,6 +40,7 @@ def test_without_tracking_no_rule_of_mlflow_is_planned(everything, planned_with,
     assert planned_with(tracking=False) == everything - of_mlflow
 
 
-def test_without_boosted_trees_nothing_else_is_left_out(everything, planned_with):
-    assert "boosted_trees" in everything
-    assert planned_with(boosted_trees=False) == everything - {"boosted_trees"}
+def test_without_boosted_trees_no_rule_of_them_is_planned(everything, planned_with):
+    of_trees = {"boosted_trees", "observer_trees"}
+    assert of_trees <= everything
+    assert planned_with(boosted_trees=False) == everything - of_trees

@@ -65,7 +65,7 @@ def lines_of(first_seed: int, other_lines: float = OTHER_LINES) -> dict[str, Syn
     """Name -> settings of each line; the seeds are counted from the first.
 
     Args:
-        other_lines: cables of other lines per km, which are no wires of this one in the truth.
+        other_lines: cables of other lines per km, which are not wires of this one in the truth.
     """
     return {
         name: SyntheticSettings(**own, seed=first_seed + number, other_lines=other_lines)

@@ -60,7 +60,7 @@ MOST_GUESSES = 6000
 """Guesses that are compared at once."""
 
 SINGLE = np.zeros((1, 2))
-"""m, the offset of a wire that is no bundle."""
+"""m, the offset of a single wire."""
 
 FAR_M = 80.0
 """m, distance of two pieces from which a guess is as good as one from pieces further apart."""

@@ -191,7 +191,7 @@ def _base(said: float | None, tower: MeasuredTower) -> float:
 
 
 def _measures(values: Mapping[str, object], tower: MeasuredTower, points: int) -> dict[str, object]:
-    """What was measured of an added tower, for the columns that its list has and nobody gave."""
+    """What was measured of an added tower, for the columns of its list that no review gives."""
     measured = {
         "base": tower.base,
         "height": tower.height,

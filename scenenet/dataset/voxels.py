@@ -119,7 +119,7 @@ class VoxelGrid:
     @classmethod
     def on_map(cls, xyz: np.ndarray, voxel_size: float) -> VoxelGrid:
         """As many voxels of ``voxel_size`` (m) as points (N, 3) need, with borders at multiples of
-        it in map coordinates, as ``scenenet.prediction.work.tiling`` places them.
+        it in map coordinates, as ``scenenet.prediction.work.lattice`` places them.
 
         Raises:
             InputError: there are no points, or they are too far apart.

@@ -9,8 +9,9 @@ import numpy as np
 
 from scenenet.clearance.section import Area, SectionPoints
 from scenenet.prediction.found_line import WireSearch
+from scenenet.prediction.work.lattice import groups
 from scenenet.prediction.work.structures import Owners, Structures
-from scenenet.prediction.work.tiling import TileSpool, groups
+from scenenet.prediction.work.tiling import TileSpool
 
 KEPT_POINTS = 4_000_000
 """Points in memory besides those of a section: neighbouring sections need the same tiles."""

@@ -19,8 +19,9 @@ from scenenet.line.records import SurveyLine
 from scenenet.line.wire_points import WirePoints
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_near
 from scenenet.prediction.surroundings import occupied_voxels
+from scenenet.prediction.work.lattice import groups
 from scenenet.prediction.work.tile_predictions import TilePredictions
-from scenenet.prediction.work.tiling import TileSpool, groups
+from scenenet.prediction.work.tiling import TileSpool
 
 SURE, DOUBTFUL = 0.85, 0.7
 """Shares of tau from which points may be those of a wire, and from which they count beside wires

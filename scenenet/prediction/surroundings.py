@@ -12,7 +12,8 @@ import numpy as np
 
 from scenenet.core.compilation import EXACT
 from scenenet.detection.within import within
-from scenenet.prediction.work.tiling import EDGE, TileSpool
+from scenenet.prediction.work.lattice import EDGE
+from scenenet.prediction.work.tiling import TileSpool
 
 KEPT_TILES = 64
 """Tiles of voxels kept in memory: successive look-ups mostly need the same ones."""

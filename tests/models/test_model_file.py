@@ -18,7 +18,7 @@ from scenenet.models.metric_scenenet import MetricSceneNet
 from scenenet.models.model_file import read_model, suffix, write_model
 from scenenet.models.scenenet import SceneNet
 from scenenet.models.settings import LARGEST_KERNEL, MetricSettings
-from scenenet.prediction.work.tiling import EDGE
+from scenenet.prediction.work.lattice import EDGE
 
 CARD = model_card(fit="cube", voxel_size=0.9, tau=0.25, provenance={"seed": 3, "config": "abc"})
 

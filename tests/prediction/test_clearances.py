@@ -27,13 +27,14 @@ from scenenet.prediction.clearance_lists import write_clearance_layers, write_cl
 from scenenet.prediction.found_clearances import find_clearances_in_survey
 from scenenet.prediction.found_line import WireSearch
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
+from scenenet.prediction.work.lattice import groups
 from scenenet.prediction.work.structures import Structures
 from scenenet.prediction.work.tile_predictions import (
     PREDICTED_KINDS,
     TilePrediction,
     TilePredictions,
 )
-from scenenet.prediction.work.tiling import TileSpool, groups
+from scenenet.prediction.work.tiling import TileSpool
 from scenenet.prediction.work.work_file import WorkFile, read_file
 from scenenet.synthetic.codes import CONDUCTOR
 from scenenet.synthetic.corridor import make_corridor

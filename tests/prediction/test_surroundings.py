@@ -8,7 +8,8 @@ from fixtures.spools import spool_of
 
 from scenenet.prediction import surroundings
 from scenenet.prediction.surroundings import SurveySurroundings, occupied_voxels, survey_points
-from scenenet.prediction.work.tiling import Lattice, TileSpool
+from scenenet.prediction.work.lattice import Lattice
+from scenenet.prediction.work.tiling import TileSpool
 
 ORIGIN = np.array([544_000.0, 4_634_000.0, 80.0])
 

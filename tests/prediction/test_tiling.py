@@ -14,13 +14,14 @@ from scenenet.core.errors import InputError
 from scenenet.models.cnn import CNN
 from scenenet.models.scenenet import SceneNet
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
+from scenenet.prediction.work.lattice import EDGE, Lattice, code_of, groups
 from scenenet.prediction.work.tile_predictions import (
     PREDICTED_KINDS,
     TilePrediction,
     TilePredictions,
 )
 from scenenet.prediction.work.tile_predictor import AT_ONCE, MOST_AT_ONCE, TilePredictor, _together
-from scenenet.prediction.work.tiling import EDGE, Lattice, Tile, TileSpool, code_of, groups
+from scenenet.prediction.work.tiling import Tile, TileSpool
 
 ORIGIN = np.array([500_000.0, 4_630_000.0, 100.0])
 

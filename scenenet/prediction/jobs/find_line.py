@@ -16,8 +16,9 @@ from scenenet.prediction.found_towers import FoundTowers, TowerSearch
 from scenenet.prediction.jobs.joined import joined_predictions, joined_work, write_near
 from scenenet.prediction.survey_files import SurveyFiles
 from scenenet.prediction.work.conductor_points import columns_reached
+from scenenet.prediction.work.lattice import column_of
 from scenenet.prediction.work.survey_work import SurveyWork
-from scenenet.prediction.work.tiling import Layer, column_of
+from scenenet.prediction.work.tiling import Layer
 from scenenet.prediction.work.work_file import WorkFile
 
 

@@ -8,13 +8,14 @@ from pathlib import Path
 from scenenet.core.errors import InputError
 from scenenet.measurement.registry import measurement_named
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.work.lattice import Lattice
 from scenenet.prediction.work.survey_work import belonging
 from scenenet.prediction.work.tile_predictor import (
     needed_around,
     observed_voxel_size,
     predict_file,
 )
-from scenenet.prediction.work.tiling import Lattice, Layer, TileSpool
+from scenenet.prediction.work.tiling import Layer, TileSpool
 from scenenet.prediction.work.work_file import WorkFile
 
 

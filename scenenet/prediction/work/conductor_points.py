@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from scenenet.line.records import Conductor
-from scenenet.prediction.work.tiling import Lattice, column_of, groups
+from scenenet.prediction.work.lattice import Lattice, column_of, groups
 
 PIECE_M = 20.0
 """m, pieces of a conductor that are looked up by their bounding boxes."""

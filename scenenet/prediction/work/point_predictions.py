@@ -10,10 +10,10 @@ import numpy as np
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.prediction.work.conductor_points import ConductorOwners
+from scenenet.prediction.work.lattice import Lattice, groups
 from scenenet.prediction.work.structures import Owners, Structures
 from scenenet.prediction.work.survey_system import in_metres
 from scenenet.prediction.work.tile_predictions import TilePredictions
-from scenenet.prediction.work.tiling import Lattice, groups
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from scenenet.detection.structure import Structure
 from scenenet.detection.structure_record import from_record, to_record
-from scenenet.prediction.work.tiling import Lattice, column_of, groups
+from scenenet.prediction.work.lattice import Lattice, column_of, groups
 
 
 @dataclass(frozen=True)

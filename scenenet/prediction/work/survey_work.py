@@ -8,7 +8,8 @@ from pathlib import Path
 
 from scenenet.prediction.file_status import SurveyFile, readable
 from scenenet.prediction.survey_files import SurveyFiles, in_other_system, nothing_to_use
-from scenenet.prediction.work.tiling import Lattice, Layer, TileSpool
+from scenenet.prediction.work.lattice import Lattice
+from scenenet.prediction.work.tiling import Layer, TileSpool
 from scenenet.prediction.work.work_file import SurveySystem, WorkFile
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from scenenet.pointcloud.targets import Target
 from scenenet.prediction.work.block_file import BlockFile
-from scenenet.prediction.work.tiling import Lattice, TileSpool
+from scenenet.prediction.work.lattice import Lattice
+from scenenet.prediction.work.tiling import TileSpool
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel

@@ -17,8 +17,9 @@ from scenenet.measurement.heights import columns_around
 from scenenet.measurement.registry import PRESENCE, measurement_named
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.work.block_file import BlockWriter
+from scenenet.prediction.work.lattice import EDGE, by_column, code_of
 from scenenet.prediction.work.tile_predictions import PREDICTED_KINDS, TilePrediction, geneo_names
-from scenenet.prediction.work.tiling import EDGE, Layer, Tile, TileSpool, by_column, code_of
+from scenenet.prediction.work.tiling import Layer, Tile, TileSpool
 from scenenet.prediction.work.work_file import WorkFile
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """A survey as tiles of voxels on disk, so that memory does not limit its length.
 
-The voxels of all surveys are on one lattice: voxel (i, j, k) covers [i, i + 1) * voxel_size in map
-coordinates. The prediction of a tile is therefore the same wherever a survey is cut.
+The voxels of all surveys are on one lattice (``scenenet.prediction.work.lattice``). The prediction
+of a tile is therefore the same wherever a survey is cut.
 """
 
 from __future__ import annotations
@@ -17,12 +17,8 @@ import numba
 import numpy as np
 
 from scenenet.core.compilation import EXACT
-from scenenet.core.errors import InputError
-from scenenet.dataset.voxels import BORDER_M
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
-
-EDGE = 64
-"""Voxels along the edge of a tile; a tile and its halo fit into a processor's cache."""
+from scenenet.prediction.work.lattice import EDGE, Lattice, codes_of, groups, place_of
 
 KEPT_TILES = 128
 """Tiles in memory, 8 or 16 bytes a voxel: a tile and its neighbours are asked for again by the next
@@ -31,8 +27,6 @@ one."""
 NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)))
 """(27, 3) steps (z, y, x) from a tile to itself and to the tiles around it."""
 
-_BITS = 21
-_BIAS = 1 << (_BITS - 1)
 _SPOOLED = np.dtype([("voxel", "<i4"), ("count", "<i4")])
 _MEASURED = np.dtype([("voxel", "<i4"), ("count", "<i4"), ("total", "<i8")])
 _OFFSET = np.dtype("<f4")
@@ -91,56 +85,6 @@ class Tile:
         """(M, 3) int64 positions on the lattice."""
         local = np.stack(np.unravel_index(self.voxel, (EDGE,) * 3), axis=1)
         return local + np.asarray(self.place, np.int64) * EDGE
-
-
-@dataclass(frozen=True)
-class Lattice:
-    """The lattice of voxels that all surveys are on.
-
-    Attributes:
-        voxel_size: m.
-    """
-
-    voxel_size: float
-
-    def locate(self, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tile code (n,) int64 and position in the tile (n,) int32 of points (n, 3) m.
-
-        Raises:
-            InputError: a coordinate is outside the lattice.
-        """
-        # Axis by axis, which takes half the time of all three together.
-        steps = [np.floor((xyz[:, axis] + BORDER_M) / self.voxel_size) for axis in (2, 1, 0)]
-        inside = [np.abs(step) < _BIAS * EDGE for step in steps]
-        if not all(each.all() for each in inside):
-            row = int(np.argmin(np.logical_and.reduce(inside)))
-            raise InputError(
-                f"the point {xyz[row].tolist()} is too far from the origin for voxels of "
-                f"{self.voxel_size:g} m",
-                remedy="Remove stray points, or convert the survey to metres",
-            )
-        z, y, x = (step.astype(np.int64) for step in steps)
-        voxel = ((z & (EDGE - 1)) * EDGE + (y & (EDGE - 1))) * EDGE + (x & (EDGE - 1))
-        return _encode(z >> 6, y >> 6, x >> 6), voxel.astype(np.int32)
-
-    def centres(self, zyx: np.ndarray) -> np.ndarray:
-        """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
-        centres = zyx[:, ::-1] + 0.5
-        centres *= self.voxel_size
-        return centres
-
-    def corner(self, code: int) -> np.ndarray:
-        """(3,) m, lowest x, y and z of a tile."""
-        return np.array(_decode(code)[::-1]) * (EDGE * self.voxel_size)
-
-    def columns(self, x: tuple[float, float], y: tuple[float, float]) -> set[tuple[int, int]]:
-        """(x, y) numbers of the columns of tiles that the rectangle of two ranges in m touches."""
-        edge = EDGE * self.voxel_size
-        (west, east), (south, north) = (
-            (int(np.floor((low - BORDER_M) / edge)), int(np.floor((high + 2 * BORDER_M) / edge)))
-            for low, high in (x, y)
-        )
-        return set(product(range(west, east + 1), range(south, north + 1)))
 
 
 class SpoolWriter:
@@ -228,7 +172,7 @@ class TileSpool:
                 self._files[code].append(file)
         self._columns: dict[tuple[int, int], list[int]] = defaultdict(list)
         for code in sorted(self._files):
-            self._columns[_decode(code)[1:]].append(code)
+            self._columns[place_of(code)[1:]].append(code)
         self._kept = lru_cache(maxsize=KEPT_TILES)(self._tile)
 
     @property
@@ -246,7 +190,7 @@ class TileSpool:
 
     def places(self) -> list[tuple[int, tuple[int, int, int]]]:
         """Code and place of every tile that holds a point, in a fixed order."""
-        return [(code, _decode(code)) for code in sorted(self._files)]
+        return [(code, place_of(code)) for code in sorted(self._files)]
 
     def tile(self, code: int) -> Tile:
         """The tile with ``code``; a tile without voxels if it holds no point. The tiles that were
@@ -260,7 +204,7 @@ class TileSpool:
         if self._measured:
             total = np.zeros(len(voxel), np.int64)
             np.add.at(total, inverse, records["total"])
-        return Tile(_decode(code), voxel, count.astype(np.int32), total)
+        return Tile(place_of(code), voxel, count.astype(np.int32), total)
 
     def points(self, code: int) -> np.ndarray:
         """(n, 3) m, points of the tile with ``code``, to a few micrometres, in a fixed order.
@@ -307,7 +251,7 @@ class TileSpool:
         low = np.asarray(place) * EDGE - reach
         shape = np.array([EDGE + 2 * r for r in reach])
         indices, counts, totals = [], [], []
-        for code in _encode(*(np.asarray(place) + NEIGHBOURS).T).tolist():
+        for code in codes_of(*(np.asarray(place) + NEIGHBOURS).T).tolist():
             if code not in self._files:
                 continue
             tile = self.tile(code)
@@ -338,7 +282,7 @@ class TileSpool:
         low = np.asarray(place) * EDGE - reach
         shape = np.array([EDGE + 2 * r for r in reach])
         indices, found = [np.empty(0, np.int64)], [np.empty(0, np.float32)]
-        for code in _encode(*(np.asarray(place) + NEIGHBOURS).T).tolist():
+        for code in codes_of(*(np.asarray(place) + NEIGHBOURS).T).tolist():
             if code not in self._files:
                 continue
             value, tile = values(code), self.tile(code)
@@ -414,43 +358,3 @@ def _ascending(values: np.ndarray) -> np.ndarray:
     """(n,) uint32 in the order of float32 values (n,)."""
     bits = np.ascontiguousarray(values).view(np.uint32)
     return np.where(bits >> 31, ~bits, bits | np.uint32(1 << 31))
-
-
-def code_of(place: tuple[int, int, int]) -> int:
-    """The code of the tile at ``place`` (z, y, x)."""
-    return int(_encode(*np.asarray(place)))
-
-
-def by_column(code: int) -> tuple[int, int, int]:
-    """(y, x, z) of the tile with ``code``: the order in which the neighbours of a tile come soon
-    after it."""
-    z, y, x = _decode(code)
-    return y, x, z
-
-
-def column_of(code: int) -> tuple[int, int]:
-    """(x, y) number of the column of tiles that has the tile with ``code``."""
-    _, y, x = _decode(code)
-    return x, y
-
-
-def groups(codes: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
-    """Each distinct code in ``codes`` (n,), with its rows."""
-    order = np.argsort(codes, kind="stable")
-    borders = np.flatnonzero(np.diff(codes[order])) + 1
-    for rows in np.split(order, borders) if len(order) else []:
-        yield int(codes[rows[0]]), rows
-
-
-def _encode(z: np.ndarray, y: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """The codes (n,) of the tiles at places z, y, x, each (n,)."""
-    return ((z + _BIAS) << (2 * _BITS)) | ((y + _BIAS) << _BITS) | (x + _BIAS)
-
-
-def _decode(code: int) -> tuple[int, int, int]:
-    mask = (1 << _BITS) - 1
-    return (
-        (code >> (2 * _BITS)) - _BIAS,
-        ((code >> _BITS) & mask) - _BIAS,
-        (code & mask) - _BIAS,
-    )

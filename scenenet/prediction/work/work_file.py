@@ -18,8 +18,9 @@ from scenenet.pointcloud.quality.screening import Screening
 from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
+from scenenet.prediction.work.lattice import Lattice
 from scenenet.prediction.work.survey_system import SurveySystem, in_metres
-from scenenet.prediction.work.tiling import Lattice, Layer, SpoolWriter, spooled_kinds
+from scenenet.prediction.work.tiling import Layer, SpoolWriter, spooled_kinds
 
 if TYPE_CHECKING:
     import pyproj

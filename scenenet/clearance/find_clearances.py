@@ -20,7 +20,7 @@ from scenenet.clearance.records import (
     SpanClearance,
     SurveyClearances,
 )
-from scenenet.clearance.sags import hung, without_conductor
+from scenenet.clearance.sags import with_sags, without_conductor
 from scenenet.clearance.section import BEYOND_M, Area, PointsIn, measure, sections
 from scenenet.clearance.settings import KINDS, VEGETATION, WIRE, ClearanceLimits, ClearanceSettings
 from scenenet.clearance.trees import Trees
@@ -95,7 +95,7 @@ class _Finder:
         scheme: ClassScheme | None,
         limits: ClearanceLimits | None,
     ) -> None:
-        self._flown, self._line = line, hung(line, settings.sags)
+        self._flown, self._line = line, with_sags(line, settings.sags)
         self._points, self._settings = points, settings
         self._scheme, self._limits = scheme, limits
         self.kinds = kinds_from(scheme)

@@ -40,7 +40,7 @@ def read_sags(path: Path) -> tuple[SpanSag, ...]:
     return tuple(found.values())
 
 
-def hung(line: SurveyLine, sags: Sequence[SpanSag]) -> SurveyLine:
+def with_sags(line: SurveyLine, sags: Sequence[SpanSag]) -> SurveyLine:
     """The line with its conductors as they hang by a table; those that it does not name are as
     flown.
 
@@ -53,7 +53,7 @@ def hung(line: SurveyLine, sags: Sequence[SpanSag]) -> SurveyLine:
         sag = by_wire.get((wire.span_id, wire.conductor_id))
         if sag is None and wire.kind != "earth wire":
             sag = by_wire.get((wire.span_id, None))
-        wires.append(wire if sag is None else _hung(wire, sag))
+        wires.append(wire if sag is None else _with_parameter(wire, sag))
     return replace(line, conductors=tuple(wires))
 
 
@@ -62,7 +62,7 @@ def without_conductor(line: SurveyLine, sags: Sequence[SpanSag]) -> list[int]:
     return sorted({sag.span for sag in sags} - {wire.span_id for wire in line.conductors})
 
 
-def _hung(wire: Conductor, sag: SpanSag) -> Conductor:
+def _with_parameter(wire: Conductor, sag: SpanSag) -> Conductor:
     """A conductor between its attachments with another parameter, and without wind."""
     flown = wire.catenary
     curve = Catenary(flown.start, flown.end, sag.c)

@@ -14,8 +14,8 @@ import numpy as np
 from scenenet.detection.conductor_rules import BEND, SECTOR
 from scenenet.line.frame import SpanFrame
 from scenenet.line.graph import STRAY
-from scenenet.line.hung import REACH_M, LineTower
 from scenenet.line.records import Conductor, LineSpan
+from scenenet.line.traced_spans import REACH_M, LineTower
 
 CROWN_M = 6.0
 """m in plan from the nearest conductor of a span within which a tree may be taken for its tower:

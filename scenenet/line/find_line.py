@@ -10,11 +10,11 @@ import numpy as np
 from scenenet.detection.tower_ids import tower_ids
 from scenenet.line.catenary import Catenary
 from scenenet.line.graph import Chain, chains
-from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan
 from scenenet.line.notes import EXPECTED, UNHELD, UNTRACED, LineNote
 from scenenet.line.records import Conductor, LineSpan, SurveyLine
 from scenenet.line.spans import find_spans
 from scenenet.line.supports import supports
+from scenenet.line.traced_spans import REACH_M, LineTower, SpanWire, TracedSpan
 from scenenet.line.untraced import untraced_spans
 from scenenet.line.wire_points import WirePoints
 
@@ -176,7 +176,7 @@ def _conductors(span: TracedSpan, span_id: int, slack: float) -> list[Conductor]
     """The conductors of a span, numbered from left to right and from the top. Wires with a
     parameter below ``slack`` m are cables."""
 
-    def place(wire: HungWire) -> tuple[float, float]:
+    def place(wire: SpanWire) -> tuple[float, float]:
         middle = wire.catenary.at_shares(np.array([0.5]))
         _, left, z = span.frame.to_frame(middle)[0].tolist()
         return -round(left, 1), -z
@@ -211,7 +211,7 @@ def _conductors(span: TracedSpan, span_id: int, slack: float) -> list[Conductor]
     return found
 
 
-def _earth_wires(wires: Sequence[HungWire]) -> set[int]:
+def _earth_wires(wires: Sequence[SpanWire]) -> set[int]:
     """Numbers of the earth wires: those above full circuits, if they are the highest ones."""
     over = len(wires) % PHASES
     if over == 0 or over > MOST_EARTH_WIRES or len(wires) < PHASES:

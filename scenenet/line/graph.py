@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenenet.line.hung import TracedSpan
+from scenenet.line.traced_spans import TracedSpan
 
 SHARPEST = 100.0
 """Degrees, greatest change of direction of a line at a tower. Lines end or branch at a sharper

@@ -11,8 +11,8 @@ import numpy as np
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.frame import SpanFrame
-from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.trace import TAUTEST_M
+from scenenet.line.traced_spans import REACH_M, LineTower, SpanWire, TracedSpan, traced
 from scenenet.line.wire_points import WirePoints
 
 MIN_ALONE_M, MIN_HELD_M = 25.0, 15.0
@@ -143,9 +143,9 @@ def _parts(frame: SpanFrame, towers: Sequence[LineTower]) -> list[SpanFrame]:
     return sorted(parts, key=lambda part: -part.length)
 
 
-def _by_towers(wires: Sequence[HungWire], towers: Sequence[LineTower]) -> list[TracedSpan]:
+def _by_towers(wires: Sequence[SpanWire], towers: Sequence[LineTower]) -> list[TracedSpan]:
     """The wires of a stretch by the towers at their ends."""
-    groups: dict[tuple[int, int], list[tuple[HungWire, LineTower | None, LineTower | None]]] = {}
+    groups: dict[tuple[int, int], list[tuple[SpanWire, LineTower | None, LineTower | None]]] = {}
     for wire in wires:
         catenary = wire.catenary
         first = _tower_at(catenary, towers, at_end=False)

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from scenenet.detection.conductor_rules import BEND_WIRE_M, OPPOSITE, POLE_M
-from scenenet.line.hung import LineTower
 from scenenet.line.records import Conductor
+from scenenet.line.traced_spans import LineTower
 
 PASSED = 0.005
 """Half the change of slope, or of direction, m per m, up to which conductors pass. The fits of

@@ -10,9 +10,9 @@ from scenenet.core.progress import track
 from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M, SHORTEST_SPAN_M
 from scenenet.line.frame import SpanFrame
 from scenenet.line.graph import STRAY
-from scenenet.line.hung import REACH_M, HungWire, LineTower, TracedSpan, traced
 from scenenet.line.lone_wires import lone_spans
 from scenenet.line.trace import GAP_M
+from scenenet.line.traced_spans import REACH_M, LineTower, SpanWire, TracedSpan, traced
 from scenenet.line.wire_points import WirePoints
 
 LONGEST_M = 1200.0
@@ -129,7 +129,7 @@ def _next_to_taller(towers: Sequence[LineTower]) -> set[int]:
     return {low.id for low, high in pairs if low.height < MUCH_LOWER * high.height}
 
 
-def _beside(tower: LineTower, wires: Sequence[HungWire]) -> bool:
+def _beside(tower: LineTower, wires: Sequence[SpanWire]) -> bool:
     """Whether all of these parallel wires pass a tower on one side, and none is close to it."""
     sides = [float(wire.catenary.along(tower.place[None])[1][0]) for wire in wires]
     pole = tower.width is not None and tower.width <= POLE_M
@@ -169,8 +169,8 @@ def _pairs(
 
 
 def _between(
-    wires: Sequence[HungWire], frame: SpanFrame, first: LineTower, last: LineTower
-) -> Iterator[HungWire]:
+    wires: Sequence[SpanWire], frame: SpanFrame, first: LineTower, last: LineTower
+) -> Iterator[SpanWire]:
     """The wires that two towers hold, from the one to the other."""
     hidden = max(UNSEEN_M, UNSEEN_SHARE * frame.length)
     for wire in wires:

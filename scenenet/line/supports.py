@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from scenenet.line.hung import LineTower
 from scenenet.line.records import Conductor, LineSpan, Support
+from scenenet.line.traced_spans import LineTower
 
 LEVEL_M = 1.2
 """m, difference of heights above which attachments are on different crossarms. Insulators of one

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from scenenet.line.graph import STRAY
-from scenenet.line.hung import LineTower
 from scenenet.line.notes import UNTRACED, LineNote
 from scenenet.line.records import LineSpan
 from scenenet.line.spans import BETWEEN_M
+from scenenet.line.traced_spans import LineTower
 
 FACES = 60.0
 """Degrees, greatest turn of a line at both towers of a gap at which its two ends face each other.

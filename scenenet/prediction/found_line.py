@@ -12,10 +12,10 @@ import numpy as np
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.line.bypassed import bypassed_towers
 from scenenet.line.find_line import find_line
-from scenenet.line.hung import REACH_M, LineTower
 from scenenet.line.notes import EXPECTED, FOUND_AGAIN, PASSED, UNHELD, LineNote
 from scenenet.line.passed import passed_towers
 from scenenet.line.records import SurveyLine
+from scenenet.line.traced_spans import REACH_M, LineTower
 from scenenet.line.wire_points import WirePoints
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_near
 from scenenet.prediction.surroundings import occupied_voxels

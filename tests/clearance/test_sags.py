@@ -10,7 +10,7 @@ from fixtures.true_line import true_line
 from scipy.spatial import cKDTree
 
 from scenenet.clearance.find_clearances import find_clearances
-from scenenet.clearance.sags import hung, read_sags
+from scenenet.clearance.sags import read_sags, with_sags
 from scenenet.clearance.section import SectionPoints
 from scenenet.clearance.settings import ClearanceSettings, SpanSag
 from scenenet.core.errors import InputError
@@ -58,7 +58,7 @@ def test_clearances_are_those_of_the_lower_wires(corridor):
             assert row == before and row.positions == AS_FLOWN
     assert hot.counts()["positions"] == sorted({AS_FLOWN, hot.spans[0].positions} | {
         row.positions for row in hot.spans})  # fmt: skip
-    wires = [w for w in hung(corridor[2], sags).conductors if w.span_id == first]
+    wires = [w for w in with_sags(corridor[2], sags).conductors if w.span_id == first]
     curves = [wire.catenary.at(np.arange(0, wire.catenary.length, 0.05)) for wire in wires]
     [place, *_] = sorted(
         (p for p in hot.places if p.span_id == first and p.kind == "ground"),
@@ -75,7 +75,7 @@ def test_what_touches_a_modelled_wire_is_found_and_the_wire_as_flown_is_no_obsta
     c = min(w.catenary.parameter for w in line.conductors if w.span_id == span)
     sags = (SpanSag(span=span, c=0.5 * c),)
     low = min(
-        (w.catenary for w in hung(line, sags).conductors if w.span_id == span),
+        (w.catenary for w in with_sags(line, sags).conductors if w.span_id == span),
         key=lambda curve: curve.height(np.array([curve.length / 2]))[0],
     )
     crown = low.at(np.linspace(0.45, 0.55, 400) * low.length)
@@ -97,21 +97,23 @@ def test_attachments_stay_and_earth_wires_are_as_flown_unless_named(corridor):
     own = [wire for wire in line.conductors if wire.span_id == span]
     earth = replace(own[0], kind="earth wire")
     line = replace(line, conductors=(earth, *own[1:]))
-    still, *lower = hung(line, [SpanSag(span=span, c=500)]).conductors
+    still, *lower = with_sags(line, [SpanSag(span=span, c=500)]).conductors
     assert still == earth
     for wire, before in zip(lower, own[1:], strict=True):
         assert (wire.catenary.start, wire.catenary.end) == (
             before.catenary.start, before.catenary.end)  # fmt: skip
         assert wire.c == wire.catenary.parameter == 500 and wire.sag == wire.catenary.sag
     number = earth.conductor_id
-    named = hung(line, [SpanSag(span=span, c=500), SpanSag(span=span, conductor=number, c=700)])
+    named = with_sags(
+        line, [SpanSag(span=span, c=500), SpanSag(span=span, conductor=number, c=700)]
+    )
     assert [wire.c for wire in named.conductors] == [700, *[500] * len(lower)]
 
 
 def test_a_parameter_that_lets_a_wire_lie_on_the_ground_is_refused(corridor):
     span = corridor[2].spans[0].span_id
     with pytest.raises(InputError, match="sag by more than half"):
-        hung(corridor[2], [SpanSag(span=span, c=1.0)])
+        with_sags(corridor[2], [SpanSag(span=span, c=1.0)])
 
 
 def test_spans_that_the_survey_does_not_have_are_named(corridor, capsys):

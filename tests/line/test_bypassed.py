@@ -10,7 +10,7 @@ from fixtures.line_scene import PYLONS, known_line
 
 from scenenet.line.bypassed import bypassed_towers
 from scenenet.line.find_line import find_line
-from scenenet.line.hung import ABOVE_TOP_M, LineTower
+from scenenet.line.traced_spans import ABOVE_TOP_M, LineTower
 
 TREE = 99
 

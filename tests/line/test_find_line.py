@@ -11,9 +11,9 @@ from fixtures.line_scene import KnownLine, points_on
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.find_line import find_line
-from scenenet.line.hung import STEEP, LineTower
 from scenenet.line.notes import UNHELD, UNTRACED
 from scenenet.line.records import SurveyLine
+from scenenet.line.traced_spans import STEEP, LineTower
 from scenenet.line.wire_points import WirePoints
 
 

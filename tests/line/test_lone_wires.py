@@ -6,8 +6,8 @@ import multiprocessing
 
 import numpy as np
 
-from scenenet.line.hung import LineTower
 from scenenet.line.lone_wires import lone_spans
+from scenenet.line.traced_spans import LineTower
 from scenenet.line.wire_points import WirePoints
 
 

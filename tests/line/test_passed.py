@@ -9,8 +9,8 @@ import pytest
 from fixtures.line_scene import PYLONS, known_line
 
 from scenenet.line.find_line import find_line
-from scenenet.line.hung import LineTower
 from scenenet.line.passed import passed_towers
+from scenenet.line.traced_spans import LineTower
 
 WIDE_M = 4.0
 

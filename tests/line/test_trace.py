@@ -7,8 +7,8 @@ import pytest
 from fixtures.line_scene import points_on
 
 from scenenet.line.catenary import Catenary
-from scenenet.line.hung import WORST_M
 from scenenet.line.trace import trace_wires
+from scenenet.line.traced_spans import WORST_M
 
 BUNDLES = [
     [(-0.2, 0), (0.2, 0)],
@@ -17,7 +17,7 @@ BUNDLES = [
 ]
 
 
-def hung(t: float, z: float) -> Catenary:
+def catenary(t: float, z: float) -> Catenary:
     return Catenary((0.0, t, z), (280.0, t + 1.5, z + 6.0), 1200.0)
 
 
@@ -30,7 +30,7 @@ def nearest(wires, true: Catenary) -> float:
 
 def test_wires_side_by_side_are_told_apart():
     rng = np.random.default_rng(0)
-    true = [hung(t, z) for t in (-4.0, 0.0, 1.0, 4.0) for z in (20.0, 21.2)]
+    true = [catenary(t, z) for t in (-4.0, 0.0, 1.0, 4.0) for z in (20.0, 21.2)]
     wires = trace_wires(np.concatenate([points_on(wire, 1.0, rng) for wire in true]))
     assert len(wires) == len(true)
     assert max(nearest(wires, wire) for wire in true) < 0.03
@@ -40,21 +40,21 @@ def test_wires_side_by_side_are_told_apart():
 @pytest.mark.parametrize("places", BUNDLES, ids=len)
 def test_a_bundle_is_one_wire_with_its_number(places):
     rng = np.random.default_rng(0)
-    parts = [points_on(hung(5.0 + t, 25.0 + z), 1.0, rng) for t, z in places]
+    parts = [points_on(catenary(5.0 + t, 25.0 + z), 1.0, rng) for t, z in places]
     (wire,) = trace_wires(np.concatenate(parts))
     assert len(wire.offsets) == len(places)
     t, z = (np.array(places).min(axis=0) + np.array(places).max(axis=0)) / 2
-    assert nearest([wire], hung(5.0 + t, 25.0 + z)) < 0.03
+    assert nearest([wire], catenary(5.0 + t, 25.0 + z)) < 0.03
     assert wire.fit.rmse < 0.06
 
 
 def test_a_gap_is_bridged_where_the_catenary_says_so():
-    points = points_on(hung(0.0, 25.0), 1.0, np.random.default_rng(0))
+    points = points_on(catenary(0.0, 25.0), 1.0, np.random.default_rng(0))
     hidden = (points[:, 0] > 110) & (points[:, 0] < 160)
     (wire,) = trace_wires(points[~hidden])
     assert wire.fit.catenary.length > 270
     assert 0.75 < wire.covered < 0.9
-    assert nearest([wire], hung(0.0, 25.0)) < 0.03
+    assert nearest([wire], catenary(0.0, 25.0)) < 0.03
 
 
 def test_wires_that_meet_at_a_crossarm_are_two():
@@ -70,7 +70,7 @@ def test_wires_that_meet_at_a_crossarm_are_two():
 def test_leaves_hide_no_wire_and_make_none_from_tower_to_tower():
     rng = np.random.default_rng(5)
     leaves = rng.uniform((60.0, -8.0, 10.0), (120.0, 8.0, 24.0), (3000, 3))
-    true = hung(0.0, 22.0)
+    true = catenary(0.0, 22.0)
     wires = trace_wires(np.concatenate([points_on(true, 0.8, rng), leaves]))
     long = [w for w in wires if w.fit.rmse < WORST_M and w.fit.catenary.length > 60.0]
     assert len(long) == 1

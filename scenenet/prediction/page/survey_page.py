@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from scenenet.clearance.sags import hung
+from scenenet.clearance.sags import with_sags
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.files import write_text
 from scenenet.pointcloud.units import SYMBOLS
@@ -169,7 +169,7 @@ def as_measured(prediction: SurveyPrediction) -> SurveyPrediction:
     """The prediction with its conductors where its clearances were measured from."""
     if prediction.line is None or prediction.clearance is None:
         return prediction
-    return replace(prediction, line=hung(prediction.line, prediction.clearance.sags))
+    return replace(prediction, line=with_sags(prediction.line, prediction.clearance.sags))
 
 
 def _line_parts(content: PageContent, units: LengthUnits, positions: str) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""Towers and wires as the search for spans knows them."""
+"""Towers, wires and spans as the search for spans knows them."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class LineTower:
 
 
 @dataclass(frozen=True)
-class HungWire:
+class SpanWire:
     """A wire of a span.
 
     Attributes:
@@ -88,7 +88,7 @@ class HungWire:
     covered: float
     offsets: np.ndarray
 
-    def between(self, first: float, last: float) -> HungWire:
+    def between(self, first: float, last: float) -> SpanWire:
         """The same wire between other distances from its start, m. It is not seen beyond its
         ends."""
         seen = min(last, self.catenary.length) - max(first, 0.0)
@@ -109,7 +109,7 @@ class TracedSpan:
     start: LineTower | None
     end: LineTower | None
     frame: SpanFrame
-    wires: tuple[HungWire, ...]
+    wires: tuple[SpanWire, ...]
 
 
 def traced(
@@ -120,7 +120,7 @@ def traced(
     gap: float = GAP_M,
     *,
     doubtful: bool = False,
-) -> tuple[HungWire, ...]:
+) -> tuple[SpanWire, ...]:
     """The wires among some points, each between its first and its last point. Points that are not
     certain count where other wires of the span show that wires hang there, and in steep spans.
 
@@ -142,7 +142,7 @@ def traced(
 
 def _traced(
     points: WirePoints, rows: np.ndarray, frame: SpanFrame, rise: float, gap: float, doubtful: bool
-) -> Iterator[HungWire]:
+) -> Iterator[SpanWire]:
     certain = points.certain[rows] | doubtful
     stz = frame.to_frame(points.xyz[rows])
     wires = trace_wires(stz[certain], rise, gap)
@@ -158,12 +158,12 @@ def _traced(
         catenary = wire.fit.catenary
         taut = catenary.parameter > TAUTEST_M and catenary.length > LONG_M
         if len(wire.rows) >= MIN_POINTS and wire.fit.rmse <= WORST_M and not taut:
-            yield _hung(wire, rows[number[wire.rows]], frame)
+            yield _span_wire(wire, rows[number[wire.rows]], frame)
 
 
-def _hung(wire: Wire, rows: np.ndarray, frame: SpanFrame) -> HungWire:
+def _span_wire(wire: Wire, rows: np.ndarray, frame: SpanFrame) -> SpanWire:
     """The wire in map coordinates."""
     catenary = wire.fit.catenary
     start, end = frame.to_map(np.array([catenary.start, catenary.end]))
     on_map = Catenary.of(start, end, catenary.parameter, catenary.blowout)
-    return HungWire(on_map, wire.fit.rmse, rows, wire.covered, wire.offsets)
+    return SpanWire(on_map, wire.fit.rmse, rows, wire.covered, wire.offsets)

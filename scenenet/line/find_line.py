@@ -31,6 +31,10 @@ SLACK = 0.5
 """Share of the usual catenary parameter of a line below which a wire is a cable that ends at or
 passes a tower: telephone cables hang slacker than conductors."""
 
+SHOWN_M = 0.05
+"""m, how much deeper than usual a wire hangs through from which it shows that it is slack: the
+noise of its points. A short wire does not show it."""
+
 OWN_SPANS = 3
 """Spans from which a line shows its own usual parameter; that of a shorter one is that of the
 survey."""
@@ -74,13 +78,13 @@ def find_line(
     number = 0
     for chain in lines:
         own_spans = [traced[step.number] for step in chain.steps]
-        slack = SLACK * _usual_parameter(own_spans if len(own_spans) >= OWN_SPANS else traced)
-        cable = _is_cable(own_spans, slack)
+        usual = _usual_parameter(own_spans if len(own_spans) >= OWN_SPANS else traced)
+        cable = _is_cable(own_spans, usual)
         number += not cable
         for order, (step, angle) in enumerate(zip(chain.steps, chain.angles, strict=True), 1):
             span = _run_through(traced, chain, order - 1)
             span_id = ids[step.number]
-            own = _conductors(span, span_id, slack=np.inf if cable else slack)
+            own = _conductors(span, span_id, None if cable else usual)
             ends, expected = ("cable", []) if cable else _ends(span, seen)
             notes += [
                 LineNote(*place, EXPECTED, 0, span_id)
@@ -115,7 +119,7 @@ def find_line(
     return SurveyLine(tuple(spans), tuple(conductors), tuple(notes), tuple(held_by))
 
 
-def _is_cable(spans: Sequence[TracedSpan], slack: float) -> bool:
+def _is_cable(spans: Sequence[TracedSpan], usual: float) -> bool:
     """Whether wires are those of no line: few and short ones that no tower holds, or all of them
     slack."""
     loose = all(
@@ -123,7 +127,14 @@ def _is_cable(spans: Sequence[TracedSpan], slack: float) -> bool:
         and span.frame.length <= CABLE_M
         for span in spans
     )  # fmt: skip
-    return loose or all(wire.catenary.parameter < slack for span in spans for wire in span.wires)
+    return loose or all(_is_slack(wire.catenary, usual) for span in spans for wire in span.wires)
+
+
+def _is_slack(curve: Catenary, usual: float) -> bool:
+    """Whether a wire shows that it is slacker than wires of its line, whose parameter is usually
+    ``usual`` m."""
+    deeper = curve.length**2 / 8 * (1 / curve.parameter - 1 / usual)
+    return curve.parameter < SLACK * usual and deeper >= SHOWN_M
 
 
 def _usual_parameter(spans: Sequence[TracedSpan]) -> float:
@@ -172,9 +183,12 @@ def _turned(span: TracedSpan) -> TracedSpan:
     return TracedSpan(span.end, span.start, other, tuple(wires))
 
 
-def _conductors(span: TracedSpan, span_id: int, slack: float) -> list[Conductor]:
-    """The conductors of a span, numbered from left to right and from the top. Wires with a
-    parameter below ``slack`` m are cables."""
+def _conductors(span: TracedSpan, span_id: int, usual: float | None) -> list[Conductor]:
+    """The conductors of a span, numbered from left to right and from the top. Wires that are
+    slacker than the ``usual`` parameter in m are cables; all of them are if it is None."""
+
+    def is_cable(wire: HungWire) -> bool:
+        return usual is None or _is_slack(wire.catenary, usual)
 
     def place(wire: SpanWire) -> tuple[float, float]:
         middle = wire.catenary.at_shares(np.array([0.5]))
@@ -182,13 +196,13 @@ def _conductors(span: TracedSpan, span_id: int, slack: float) -> list[Conductor]
         return -round(left, 1), -z
 
     wires = sorted(span.wires, key=place)
-    own = [wire for wire in wires if wire.catenary.parameter >= slack]
+    own = [wire for wire in wires if not is_cable(wire)]
     earth = {id(own[number]) for number in _earth_wires(own)}
     found = []
     for number, wire in enumerate(wires):
         curve = wire.catenary
         kind = "earth wire" if id(wire) in earth else "conductor"
-        if curve.parameter < slack:
+        if is_cable(wire):
             kind = "cable"
         tube = max(TUBE_M, TUBE_RMSE * wire.rmse) + (BUNDLE_M if len(wire.offsets) > 1 else 0.0)
         heights = (

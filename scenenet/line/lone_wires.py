@@ -60,17 +60,22 @@ def lone_spans(
         wires = [
             wire
             for wire in traced(points, rows, frame)
-            if wire.catenary.length >= MIN_HELD_M
-            and wire.rmse <= WORST_ALONE_M
-            and wire.covered >= SEEN_ALONE
-            and (wire.catenary.parameter <= TAUTEST_M or wire.catenary.length < MIN_ALONE_M)
+            if wire.catenary.length >= MIN_HELD_M and is_wire(wire)
         ]
         for wire in wires:
             left[wire.rows] = free[wire.rows] = False
         # What is near the axis and on no wire is looked at once.
         near = points.beside(frame, LOOKED_AT_M)
         left[near] = False
-        found += _by_towers(wires, towers)
+        found += spans_by_towers(wires, towers)
+
+
+def is_wire(wire: SpanWire) -> bool:
+    """Whether what hangs at one tower at most is a wire: seen well, and no straighter than wires
+    are, if it is long enough to show that."""
+    curve = wire.catenary
+    hangs = curve.parameter <= TAUTEST_M or curve.length < MIN_ALONE_M
+    return hangs and wire.rmse <= WORST_ALONE_M and wire.covered >= SEEN_ALONE
 
 
 def _straightest(xyz: np.ndarray, left: np.ndarray) -> SpanFrame | None:
@@ -143,8 +148,8 @@ def _parts(frame: SpanFrame, towers: Sequence[LineTower]) -> list[SpanFrame]:
     return sorted(parts, key=lambda part: -part.length)
 
 
-def _by_towers(wires: Sequence[SpanWire], towers: Sequence[LineTower]) -> list[TracedSpan]:
-    """The wires of a stretch by the towers at their ends."""
+def spans_by_towers(wires: Sequence[SpanWire], towers: Sequence[LineTower]) -> list[TracedSpan]:
+    """The wires of a stretch by the towers at their ends, without short ones that none holds."""
     groups: dict[tuple[int, int], list[tuple[SpanWire, LineTower | None, LineTower | None]]] = {}
     for wire in wires:
         catenary = wire.catenary

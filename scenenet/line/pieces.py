@@ -9,7 +9,7 @@ import numpy as np
 
 from scenenet.core.compilation import EXACT
 
-WINDOW_M, SHORTEST_WINDOW_M, WINDOWS = 12.0, 4.0, 4
+WINDOW_M, SHORTEST_WINDOW_M, WINDOWS = 12.0, 2.5, 4
 """m, length of a piece: a wire of a parameter of 300 m bends by 6 cm over it. In a short stretch of
 wires pieces are shorter, so that it has so many, but not shorter than the second number."""
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from scenenet.core.progress import track
 from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M, SHORTEST_SPAN_M
+from scenenet.line.edge_spans import edge_spans
 from scenenet.line.frame import SpanFrame
 from scenenet.line.graph import STRAY
 from scenenet.line.lone_wires import lone_spans
@@ -76,6 +77,8 @@ def find_spans(
         span = _span(points, free, found, first, last, doubtful=True)
         if span is not None and _goes_on(found, span):
             _add(span, found, free)
+    for span in edge_spans(points, free, towers, found):
+        _add(span, found, free)
     return found + lone_spans(points, free, towers)
 
 

@@ -1,0 +1,96 @@
+"""Wires that leave a tower and soon the survey: too short to be found without the tower."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from scenenet.detection.conductor_rules import NEAR
+from scenenet.line.frame import SpanFrame
+from scenenet.line.traced_spans import REACH_M, LineTower, TracedSpan, traced
+from scenenet.line.lone_wires import LINKED_M, PARALLEL, is_wire, spans_by_towers
+from scenenet.line.wire_points import WirePoints
+
+EDGE_M = 35.0
+"""m from the axis of a tower up to which its wires are looked for here. Longer ones show without it
+that they are wires, and where they lead."""
+
+SHORTEST_WIRE_M = 6.0
+"""m, length of a wire on which it has points, at least: it is straight and level enough that no
+member of a crossarm is as long."""
+
+TURNED, STEP = 12.0, 0.5
+"""Degrees by which the wires may turn from the bearing that the tower has, and steps in which their
+direction is looked for: over 20 m, one of 12 degrees leads from a crossarm to the axis."""
+
+LANE_M = 0.5
+"""m, width of the lanes along the wires in which points are counted."""
+
+
+def edge_spans(
+    points: WirePoints,
+    free: np.ndarray,
+    towers: Sequence[LineTower],
+    found: Sequence[TracedSpan],
+) -> Iterator[TracedSpan]:
+    """The spans that leave a tower where its surroundings show conductors and no span was found.
+
+    Args:
+        free: (N,) bool, points that are on no wire yet.
+        found: the spans so far.
+    """
+    for tower in towers:
+        for bearing in np.radians(tower.bearings):
+            direction = np.array([np.sin(bearing), np.cos(bearing)])
+            if not _is_found(found, tower, direction):
+                yield from _leaving(points, free, tower, direction)
+
+
+def _leaving(
+    points: WirePoints, free: np.ndarray, tower: LineTower, direction: np.ndarray
+) -> Iterator[TracedSpan]:
+    """The span that leaves a tower in about a direction, if its wires end before ``EDGE_M``."""
+    frame = _along_wires(points, free, tower, direction)
+    rows = points.beside(frame, REACH_M)
+    rows = rows[free[rows] & points.certain[rows]]
+    if len(rows) == 0:
+        return
+    s = np.sort(frame.in_plan(points.xyz[rows])[0])
+    breaks = np.flatnonzero(np.diff(s) > LINKED_M)
+    end = float(s[breaks[0]] if len(breaks) else s[-1])
+    if end > EDGE_M - LINKED_M:
+        return
+    s = frame.in_plan(points.xyz[rows])[0]
+    rows = rows[(s >= NEAR) & (s <= end)]
+    wires = [
+        wire
+        for wire in traced(points, rows, replace(frame, length=end))
+        if wire.catenary.length >= SHORTEST_WIRE_M and is_wire(wire)
+    ]
+    yield from spans_by_towers(wires, [tower])
+
+
+def _along_wires(
+    points: WirePoints, free: np.ndarray, tower: LineTower, direction: np.ndarray
+) -> SpanFrame:
+    """The frame from a tower, ``EDGE_M`` long, along which most points are one behind another."""
+    frame = SpanFrame(tower.x, tower.y, direction, EDGE_M)
+    rows = points.beside(frame, REACH_M)
+    east, north = (points.xyz[rows[free[rows] & points.certain[rows]], :2] - tower.place).T
+    best, most = frame, -1
+    for turn in np.radians(np.arange(-TURNED, TURNED + STEP, STEP)):
+        dx, dy = direction @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        lanes = np.floor((north * dx - east * dy) / LANE_M)
+        _, count = np.unique(lanes, return_counts=True)
+        if (together := int((count**2).sum())) > most:
+            best, most = replace(frame, direction=np.array([dx, dy])), together
+    return best
+
+
+def _is_found(found: Sequence[TracedSpan], tower: LineTower, direction: np.ndarray) -> bool:
+    """Whether a span leaves a tower in about this direction."""
+    ways = [span.frame.direction for span in found if span.start is tower]
+    ways += [-span.frame.direction for span in found if span.end is tower]
+    return any(float(way @ direction) >= np.cos(np.radians(2 * PARALLEL)) for way in ways)

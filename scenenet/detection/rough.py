@@ -34,7 +34,9 @@ class RoughTower:
         base: m, elevation of the ground at its foot.
         height: m, from the base to its top.
         probability: highest probability of its voxels.
-        voxels: rows of its detected voxels.
+        detected: the detected voxels of the survey.
+        place, reach: (2,) m and m, where its own voxels lie; a long survey has too many rough
+            towers to keep the voxels of each.
     """
 
     x: float
@@ -42,7 +44,14 @@ class RoughTower:
     base: float
     height: float
     probability: float
-    voxels: np.ndarray
+    detected: DetectedVoxels
+    place: np.ndarray
+    reach: float
+
+    @property
+    def voxels(self) -> np.ndarray:
+        """Rows of its detected voxels."""
+        return self.detected.within(self.place, self.reach)
 
 
 def rough_towers(
@@ -85,7 +94,7 @@ def _measure(
         return None
     # The reach of the crossarms follows from the height.
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
-    seen = detected.within(axis, crossarm)
+    place, seen = axis, detected.within(axis, crossarm)
     axis, free = centre_body(around, axis, body, size)
     if not free:
         return None
@@ -93,4 +102,5 @@ def _measure(
     if body.height < min_height or body.upright < min_upright:
         return None
     peak = float(detected.probability[seen].max())
-    return RoughTower(float(axis[0]), float(axis[1]), body.base, body.height, peak, seen)
+    x, y = axis.tolist()
+    return RoughTower(x, y, body.base, body.height, peak, detected, place, crossarm)

@@ -9,8 +9,8 @@ import numpy as np
 
 from scenenet.detection.conductor_rules import NEAR
 from scenenet.line.frame import SpanFrame
-from scenenet.line.traced_spans import REACH_M, LineTower, TracedSpan, traced
 from scenenet.line.lone_wires import LINKED_M, PARALLEL, is_wire, spans_by_towers
+from scenenet.line.traced_spans import REACH_M, LineTower, TracedSpan, traced
 from scenenet.line.wire_points import WirePoints
 
 EDGE_M = 35.0

@@ -187,7 +187,7 @@ def _conductors(span: TracedSpan, span_id: int, usual: float | None) -> list[Con
     """The conductors of a span, numbered from left to right and from the top. Wires that are
     slacker than the ``usual`` parameter in m are cables; all of them are if it is None."""
 
-    def is_cable(wire: HungWire) -> bool:
+    def is_cable(wire: SpanWire) -> bool:
         return usual is None or _is_slack(wire.catenary, usual)
 
     def place(wire: SpanWire) -> tuple[float, float]:

@@ -60,7 +60,7 @@ def lone_spans(
         wires = [
             wire
             for wire in traced(points, rows, frame)
-            if wire.catenary.length >= MIN_HELD_M and is_wire(wire)
+            if wire.catenary.length >= MIN_HELD_M and wire.rmse <= WORST_ALONE_M and is_wire(wire)
         ]
         for wire in wires:
             left[wire.rows] = free[wire.rows] = False
@@ -75,7 +75,7 @@ def is_wire(wire: SpanWire) -> bool:
     are, if it is long enough to show that."""
     curve = wire.catenary
     hangs = curve.parameter <= TAUTEST_M or curve.length < MIN_ALONE_M
-    return hangs and wire.rmse <= WORST_ALONE_M and wire.covered >= SEEN_ALONE
+    return hangs and wire.covered >= SEEN_ALONE
 
 
 def _straightest(xyz: np.ndarray, left: np.ndarray) -> SpanFrame | None:

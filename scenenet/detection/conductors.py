@@ -59,6 +59,10 @@ class Span:
     highest: float
     places: np.ndarray = field(repr=False, compare=False)
 
+    def without_places(self) -> Span:
+        """The same span without the points on its conductors."""
+        return replace(self, places=np.empty((0, 3)))
+
 
 class ConductorPoints:
     """The points of a survey that lie on conductors, looked for where they are needed."""

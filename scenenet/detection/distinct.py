@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -14,6 +18,12 @@ from scenenet.detection.surroundings import Surroundings
 
 APART_M = 2.0
 """m, smallest distance between two towers, measured in points."""
+
+CELL_M = 200.0
+"""m, edge of the cells in which towers are looked up: nothing here compares towers that are further
+apart, since a beam is shorter than half of the tallest tower."""
+
+Item = TypeVar("Item")
 
 
 def same_axis(one: MeasuredTower, other: MeasuredTower) -> bool:
@@ -29,14 +39,39 @@ def distinct_towers(found: list[MeasuredTower], points: Surroundings) -> list[Me
         points: gives the points around a position.
     """
     bodies: list[MeasuredTower] = []
+    kept: _Places[MeasuredTower] = _Places()
     for tower in sorted(found, key=_best_first):
-        if not any(_same_body(tower, other) for other in bodies):
+        if not any(_same_body(tower, other) for other in kept.near(tower)):
             bodies.append(tower)
+            kept.add(tower, tower)
     towers: list[MeasuredTower] = []
+    tallest: _Places[MeasuredTower] = _Places()
     for tower in sorted(map(_whole, _joined(bodies, points)), key=lambda t: (-t.height, t.x, t.y)):
-        if not any(_under_conductors(tower, other) for other in towers):
+        if not any(_under_conductors(tower, other) for other in tallest.near(tower)):
             towers.append(tower)
+            tallest.add(tower, tower)
     return towers
+
+
+class _Places(Generic[Item]):
+    """Items at the places of towers, so that a long line takes no longer for each of its towers."""
+
+    def __init__(self) -> None:
+        self._cells: defaultdict[tuple[int, int], list[Item]] = defaultdict(list)
+
+    def add(self, tower: MeasuredTower, item: Item) -> None:
+        """Add an item at the place of a tower."""
+        self._cells[self._cell(tower)].append(item)
+
+    def near(self, tower: MeasuredTower) -> Iterator[Item]:
+        """The items up to ``CELL_M`` m from a tower, and some that are further away."""
+        x, y = self._cell(tower)
+        for east, north in product((-1, 0, 1), repeat=2):
+            yield from self._cells.get((x + east, y + north), ())
+
+    @staticmethod
+    def _cell(tower: MeasuredTower) -> tuple[int, int]:
+        return int(tower.x // CELL_M), int(tower.y // CELL_M)
 
 
 def _best_first(tower: MeasuredTower) -> tuple[float, float, float]:
@@ -66,21 +101,22 @@ def _in_plane(one: MeasuredTower, other: MeasuredTower) -> bool:
 
 def _joined(bodies: list[MeasuredTower], points: Surroundings) -> list[list[MeasuredTower]]:
     """The bodies of each tower: one, or several that beams join."""
-    towers: list[list[MeasuredTower]] = []
-    for body in bodies:
+    towers: dict[int, list[MeasuredTower]] = {}
+    number_of: dict[int, int] = {}
+    places: _Places[int] = _Places()
+    for number, body in enumerate(bodies):
         # A leg may be joined to the body amid the conductors and to the other leg.
-        own, rest = [body], []
-        for tower in towers:
-            part = any(
+        own = [body]
+        for near in sorted({number_of[other] for other in places.near(body)}):
+            if any(
                 _overlap(body, other) or joined(body.structure, other.structure, points)
-                for other in tower
-            )
-            if part:
-                own += tower
-            else:
-                rest.append(tower)
-        towers = [*rest, own]
-    return towers
+                for other in towers[near]
+            ):
+                own += towers.pop(near)
+        towers[number] = own
+        number_of |= {id(part): number for part in own}
+        places.add(body, id(body))
+    return list(towers.values())
 
 
 def _whole(parts: list[MeasuredTower]) -> MeasuredTower:

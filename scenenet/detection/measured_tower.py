@@ -42,7 +42,11 @@ class MeasuredTower:
 
     @classmethod
     def of(cls, rough: RoughTower, structure: Structure, spans: tuple[Span, ...]) -> MeasuredTower:
-        """A tower that was found at a rough one, with the conductors that lead on."""
+        """A tower that was found at a rough one, with the conductors that lead on.
+
+        Their points are no longer needed: a long line has too many to keep those of all towers.
+        """
+        structure = replace(structure, spans=tuple(s.without_places() for s in structure.spans))
         return cls(
             x=structure.x,
             y=structure.y,
@@ -51,7 +55,7 @@ class MeasuredTower:
             width=structure.profile.width,
             free=structure.profile.free,
             upright=structure.upright,
-            spans=spans,
+            spans=tuple(span.without_places() for span in spans),
             probability=rough.probability,
             voxels=rough.voxels,
             structure=structure,

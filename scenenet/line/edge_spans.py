@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +25,13 @@ TURNED, STEP = 12.0, 0.5
 """Degrees by which the wires may turn from the bearing that the tower has, and steps in which their
 direction is looked for: over 20 m, one of 12 degrees leads from a crossarm to the axis."""
 
+BEYOND_M, AROUND_M = 15.0, 5.0
+"""m beyond the end of a wire in the air at which it is asked whether the survey goes on, and how
+far around that place."""
+
+Seen = Callable[[np.ndarray, float], np.ndarray]
+"""Gives the positions (M, 3) m of what is within a radius in m of a place (2,)."""
+
 LANE_M = 0.5
 """m, width of the lanes along the wires in which points are counted."""
 
@@ -34,18 +41,29 @@ def edge_spans(
     free: np.ndarray,
     towers: Sequence[LineTower],
     found: Sequence[TracedSpan],
+    seen: Seen,
 ) -> Iterator[TracedSpan]:
-    """The spans that leave a tower where its surroundings show conductors and no span was found.
+    """The spans that leave a tower where its surroundings show conductors and no span was found,
+    and that leave the survey as well.
 
     Args:
         free: (N,) bool, points that are on no wire yet.
         found: the spans so far.
+        seen: gives what the survey has around a place.
     """
     for tower in towers:
         for bearing in np.radians(tower.bearings):
             direction = np.array([np.sin(bearing), np.cos(bearing)])
             if not _is_found(found, tower, direction):
-                yield from _leaving(points, free, tower, direction)
+                for span in _leaving(points, free, tower, direction):
+                    if not survey_goes_on(span, int(span.start is tower), seen):
+                        yield span
+
+
+def survey_goes_on(span: TracedSpan, end: int, seen: Seen) -> bool:
+    """Whether the survey goes on beyond the start, 0, or the end, 1, of a span."""
+    way = span.frame.direction * (1.0 if end else -1.0)
+    return len(seen(np.array(span.place(end)) + BEYOND_M * way, AROUND_M)) > 0
 
 
 def _leaving(

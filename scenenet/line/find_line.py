@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from scenenet.detection.tower_ids import tower_ids
 from scenenet.line.catenary import Catenary
+from scenenet.line.edge_spans import Seen, survey_goes_on
 from scenenet.line.graph import Chain, chains
 from scenenet.line.notes import EXPECTED, UNHELD, UNTRACED, LineNote
 from scenenet.line.records import Conductor, LineSpan, SurveyLine
@@ -39,10 +40,6 @@ OWN_SPANS = 3
 """Spans from which a line shows its own usual parameter; that of a shorter one is that of the
 survey."""
 
-BEYOND_M, AROUND_M = 15.0, 5.0
-"""m beyond the end of a wire in the air at which it is asked whether the survey goes on, and how
-far around that place."""
-
 SAME_TOWER_M = 2 * REACH_M
 """m, distance of places at which the same tower is expected: the wires of a missed one end at both
 sides of its crossarms, and on both sides of it."""
@@ -52,9 +49,6 @@ TUBE_M, TUBE_RMSE = 0.25, 3.0
 
 BUNDLE_M = 0.35
 """m that a bundle reaches from its middle: half the diagonal of four subconductors."""
-
-Seen = Callable[[np.ndarray, float], np.ndarray]
-"""Gives the positions (M, 3) m of what is within a radius in m of a place (2,)."""
 
 
 def find_line(
@@ -68,7 +62,7 @@ def find_line(
         seen: gives what the survey has around a place; it shows where the survey ends.
         progress: label of the progress on stderr; None shows no progress.
     """
-    traced = find_spans(points, towers, progress)
+    traced = find_spans(points, towers, seen, progress)
     lines = chains(traced)
     middles = [span.frame.to_map(np.array([[span.frame.length / 2, 0, 0]]))[0] for span in traced]
     ids = tower_ids(np.array(middles).reshape(-1, 3)[:, :2])
@@ -94,7 +88,7 @@ def find_line(
             kinds = [conductor.kind for conductor in own]
             spans.append(
                 LineSpan(
-                    start=_place(span, 0), end=_place(span, 1), span_id=span_id,
+                    start=span.place(0), end=span.place(1), span_id=span_id,
                     line=0 if cable else number, order=order,
                     from_tower=_id(span.start), to_tower=_id(span.end),
                     length=span.frame.length, angle=angle,
@@ -238,24 +232,16 @@ def _ends(span: TracedSpan, seen: Seen) -> tuple[str, list[tuple[float, float]]]
     """What is known of the ends of a span, and the places (x, y) m at which towers are
     expected."""
     expected, leaves = [], False
-    for tower, end, way in ((span.start, 0, -1.0), (span.end, 1, 1.0)):
+    for end, tower in enumerate((span.start, span.end)):
         if tower is not None:
             continue
-        place = np.array(_place(span, end))
-        ahead = place + way * BEYOND_M * span.frame.direction
-        if len(seen(ahead, AROUND_M)):
-            expected.append((float(place[0]), float(place[1])))
+        if survey_goes_on(span, end, seen):
+            expected.append(span.place(end))
         else:
             leaves = True
     if expected:
         return EXPECTED, expected
     return ("leaves the survey" if leaves else "between towers"), []
-
-
-def _place(span: TracedSpan, end: int) -> tuple[float, float]:
-    """(x, y) m of an end."""
-    x, y, _ = span.frame.to_map(np.array([[end * span.frame.length, 0.0, 0.0]]))[0].tolist()
-    return x, y
 
 
 def _id(tower: LineTower | None) -> int:

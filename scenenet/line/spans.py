@@ -8,7 +8,7 @@ import numpy as np
 
 from scenenet.core.progress import track
 from scenenet.detection.conductor_rules import BESIDE, BESIDE_M, POLE_M, SHORTEST_SPAN_M
-from scenenet.line.edge_spans import edge_spans
+from scenenet.line.edge_spans import Seen, edge_spans
 from scenenet.line.frame import SpanFrame
 from scenenet.line.graph import STRAY
 from scenenet.line.lone_wires import lone_spans
@@ -42,7 +42,7 @@ greater of both. Between its points, as much as at both ends together."""
 
 
 def find_spans(
-    points: WirePoints, towers: Sequence[LineTower], progress: str | None = None
+    points: WirePoints, towers: Sequence[LineTower], seen: Seen, progress: str | None = None
 ) -> list[TracedSpan]:
     """All spans, those between two towers first.
 
@@ -53,6 +53,7 @@ def find_spans(
     the line goes on there.
 
     Args:
+        seen: gives what the survey has around a place; it shows where the survey ends.
         progress: label of the progress on stderr; None shows no progress.
     """
     free = np.ones(len(points), bool)
@@ -77,7 +78,7 @@ def find_spans(
         span = _span(points, free, found, first, last, doubtful=True)
         if span is not None and _goes_on(found, span):
             _add(span, found, free)
-    for span in edge_spans(points, free, towers, found):
+    for span in edge_spans(points, free, towers, found, seen):
         _add(span, found, free)
     return found + lone_spans(points, free, towers)
 

@@ -111,6 +111,11 @@ class TracedSpan:
     frame: SpanFrame
     wires: tuple[SpanWire, ...]
 
+    def place(self, end: int) -> tuple[float, float]:
+        """(x, y) m of its start, 0, or its end, 1."""
+        x, y, _ = self.frame.to_map(np.array([[end * self.frame.length, 0.0, 0.0]]))[0].tolist()
+        return x, y
+
 
 def traced(
     points: WirePoints,

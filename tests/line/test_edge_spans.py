@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fixtures.line_scene import KnownLine
 
-from scenenet.line.edge_spans import EDGE_M
+from scenenet.line.edge_spans import EDGE_M, edge_spans
 from scenenet.line.find_line import find_line
 from scenenet.line.records import SurveyLine
 from scenenet.line.traced_spans import LineTower
@@ -22,12 +22,22 @@ def bearings(known: KnownLine, number: int, off: float = 0.0) -> tuple[float, ..
     return tuple(float(np.degrees(np.arctan2(*way)) + off) % 360 for way in ways)
 
 
-def cut_out(known: KnownLine, number: int, radius: float, off: float = 0.0) -> SurveyLine:
-    """What is found of a tower and the wires within a radius in m of it."""
-    tower = replace(known.towers[number], bearings=bearings(known, number, off))
-    near = np.hypot(*(known.xyz[:, :2] - tower.place).T)
+def cut(known: KnownLine, number: int, radius: float) -> WirePoints:
+    """The points of wires within a radius in m of a tower."""
+    near = np.hypot(*(known.xyz[:, :2] - known.towers[number].place).T)
     xyz = known.xyz[(near >= 2.0) & (near <= radius)]
-    return find_line(WirePoints(xyz, np.ones(len(xyz), bool)), [tower], known.to_its_ends)
+    return WirePoints(xyz, np.ones(len(xyz), bool))
+
+
+def cut_out(known: KnownLine, number: int, radius: float, off: float = 0.0) -> SurveyLine:
+    """What is found of a tower in a survey that ends ``radius`` m from it."""
+    tower = replace(known.towers[number], bearings=bearings(known, number, off))
+    points = cut(known, number, radius)
+
+    def seen(place: np.ndarray, reach: float) -> np.ndarray:
+        return points.xyz[np.hypot(*(points.xyz[:, :2] - place).T) <= reach]
+
+    return find_line(points, [tower], seen)
 
 
 def distances(line: SurveyLine, known: KnownLine) -> list[float]:
@@ -56,6 +66,13 @@ def test_what_leaves_a_tower_in_another_direction_is_no_span(pylons):
     assert len(line.conductors) <= 14
 
 
+def test_where_the_survey_goes_on_wires_do_not_end_beside_a_tower(pylons):
+    points, tower = cut(pylons, 2, 14.0), replace(pylons.towers[2], bearings=bearings(pylons, 2))
+    free = np.ones(len(points), bool)
+    assert not list(edge_spans(points, free, [tower], [], pylons.to_its_ends))
+    assert list(edge_spans(points, free, [tower], [], lambda place, radius: points.xyz[:0]))
+
+
 def test_a_member_as_long_as_a_crossarm_is_no_wire(pylons):
     """Points of two members of 5 m, in the direction of the line."""
     tower: LineTower = replace(pylons.towers[2], bearings=bearings(pylons, 2))
@@ -75,7 +92,5 @@ def test_longer_wires_are_found_as_without_the_bearings_of_their_tower(pylons):
     number, longer = 2, EDGE_M + 10.0
     known = cut_out(pylons, number, longer)
     tower = replace(pylons.towers[number], bearings=())
-    near = np.hypot(*(pylons.xyz[:, :2] - tower.place).T)
-    xyz = pylons.xyz[(near >= 2.0) & (near <= longer)]
-    other = find_line(WirePoints(xyz, np.ones(len(xyz), bool)), [tower], pylons.to_its_ends)
+    other = find_line(cut(pylons, number, longer), [tower], pylons.to_its_ends)
     assert [c.catenary for c in known.conductors] == [c.catenary for c in other.conductors]

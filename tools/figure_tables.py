@@ -200,6 +200,8 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of wires in surveys": printed("wires_in_surveys", "surveys.txt", 0),
         "figures of wires without other lines": printed("wires_in_surveys", "alone.txt", 0),
         "figures of wires at towers": printed("wires_at_towers", "wires_at_towers.txt", 0),
+        "figures of conductors of known lines": printed("line_truth", "line.txt", 0),
+        "figures of clearances of known lines": printed("line_truth", "line.txt", 1),
         "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }

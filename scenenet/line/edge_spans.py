@@ -1,4 +1,4 @@
-"""Wires that leave a tower and soon the survey: too short to be found without the tower."""
+"""Wires of a tower at the edge of a survey, which are too short to be found without the tower."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ EDGE_M = 35.0
 that they are wires, and where they lead."""
 
 SHORTEST_WIRE_M = 6.0
-"""m, length of a wire on which it has points, at least: it is straight and level enough that no
-member of a crossarm is as long."""
+"""m, length of a wire between its first and its last point, at least. Members of crossarms that point
+along the line are shorter."""
 
 TURNED, STEP = 12.0, 0.5
 """Degrees by which the wires may turn from the bearing that the tower has, and steps in which their
 direction is looked for: over 20 m, one of 12 degrees leads from a crossarm to the axis."""
 
 BEYOND_M, AROUND_M = 15.0, 5.0
-"""m beyond the end of a wire in the air at which it is asked whether the survey goes on, and how
-far around that place."""
-
-Seen = Callable[[np.ndarray, float], np.ndarray]
-"""Gives the positions (M, 3) m of what is within a radius in m of a place (2,)."""
+"""m, distance beyond the end of a wire at which points show that the survey goes on, and radius
+around that place."""
 
 LANE_M = 0.5
 """m, width of the lanes along the wires in which points are counted."""
+
+Seen = Callable[[np.ndarray, float], np.ndarray]
+"""Gives the positions (M, 3) m of what is within a radius in m of a place (2,)."""
 
 
 def edge_spans(

@@ -18,8 +18,8 @@ EDGE_M = 35.0
 that they are wires, and where they lead."""
 
 SHORTEST_WIRE_M = 6.0
-"""m, length of a wire between its first and its last point, at least. Members of crossarms that point
-along the line are shorter."""
+"""m, length of a wire between its first and its last point, at least. Members of crossarms that
+point along the line are shorter."""
 
 TURNED, STEP = 12.0, 0.5
 """Degrees by which the wires may turn from the bearing that the tower has, and steps in which their

@@ -26,13 +26,13 @@ small."""
 
 
 PROBED = 50_000
-"""Columns whose neighbours are looked up at once: their lists take 20 MB."""
+"""Columns whose neighbours are looked up at once; the lists of all would take too much memory."""
 
 
 class DetectedVoxels:
     """Detected voxels (V, 3) m, with search by position in plan.
 
-    A long survey has millions: each takes some 30 bytes here, and its column about 100.
+    A long survey has millions, so what follows from the column of a voxel is not kept for each.
 
     Attributes:
         offset: (3,) m, the lowest x, y and z; all positions here are relative to it.

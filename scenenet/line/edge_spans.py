@@ -71,16 +71,15 @@ def _leaving(
 ) -> Iterator[TracedSpan]:
     """The span that leaves a tower in about a direction, if its wires end before ``EDGE_M``."""
     frame = _along_wires(points, free, tower, direction)
-    rows = points.beside(frame, REACH_M)
-    rows = rows[free[rows] & points.certain[rows]]
+    rows = _rows(points, free, frame)
     if len(rows) == 0:
         return
-    s = np.sort(frame.in_plan(points.xyz[rows])[0])
-    breaks = np.flatnonzero(np.diff(s) > LINKED_M)
-    end = float(s[breaks[0]] if len(breaks) else s[-1])
+    s, _ = frame.in_plan(points.xyz[rows])
+    ordered = np.sort(s)
+    breaks = np.flatnonzero(np.diff(ordered) > LINKED_M)
+    end = float(ordered[breaks[0]] if len(breaks) else ordered[-1])
     if end > EDGE_M - LINKED_M:
         return
-    s = frame.in_plan(points.xyz[rows])[0]
     rows = rows[(s >= NEAR) & (s <= end)]
     wires = [
         wire
@@ -95,8 +94,7 @@ def _along_wires(
 ) -> SpanFrame:
     """The frame from a tower, ``EDGE_M`` long, along which most points are one behind another."""
     frame = SpanFrame(tower.x, tower.y, direction, EDGE_M)
-    rows = points.beside(frame, REACH_M)
-    east, north = (points.xyz[rows[free[rows] & points.certain[rows]], :2] - tower.place).T
+    east, north = (points.xyz[_rows(points, free, frame), :2] - tower.place).T
     best, most = frame, -1
     for turn in np.radians(np.arange(-TURNED, TURNED + STEP, STEP)):
         dx, dy = direction @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
@@ -107,8 +105,15 @@ def _along_wires(
     return best
 
 
+def _rows(points: WirePoints, free: np.ndarray, frame: SpanFrame) -> np.ndarray:
+    """Rows (n,) of the certain points in a frame that are on no wire yet."""
+    rows = points.beside(frame, REACH_M)
+    return rows[free[rows] & points.certain[rows]]
+
+
 def _is_found(found: Sequence[TracedSpan], tower: LineTower, direction: np.ndarray) -> bool:
     """Whether a span leaves a tower in about this direction."""
+    # The bearing and the span may each differ from its wires by as much as two stretches of it.
     ways = [span.frame.direction for span in found if span.start is tower]
     ways += [-span.frame.direction for span in found if span.end is tower]
     return any(float(way @ direction) >= np.cos(np.radians(2 * PARALLEL)) for way in ways)

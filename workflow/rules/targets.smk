@@ -169,7 +169,9 @@ def all_results():
 def dataset_figures():
     """The figures of the data set and of the models, which one job draws."""
     arguments = results_of()
-    return plan(Results(**{**arguments, "folder": R, "models": dict(arguments["models"]), "studies": ()}))
+    return plan(
+        Results(**{**arguments, "folder": R, "models": dict(arguments["models"]), "studies": ()})
+    )
 
 
 def model_figures():

@@ -45,11 +45,12 @@ def distinct_towers(found: list[MeasuredTower], points: Surroundings) -> list[Me
             bodies.append(tower)
             kept.add(tower, tower)
     towers: list[MeasuredTower] = []
-    tallest: _Places[MeasuredTower] = _Places()
-    for tower in sorted(map(_whole, _joined(bodies, points)), key=lambda t: (-t.height, t.x, t.y)):
-        if not any(_under_conductors(tower, other) for other in tallest.near(tower)):
+    best: _Places[MeasuredTower] = _Places()
+    # Not the tallest: a tree under conductors seems to reach up to them, as high as the tower does.
+    for tower in sorted(map(_whole, _joined(bodies, points)), key=_best_first):
+        if not any(_under_conductors(tower, other) for other in best.near(tower)):
             towers.append(tower)
-            tallest.add(tower, tower)
+            best.add(tower, tower)
     return towers
 
 

@@ -91,6 +91,14 @@ def test_a_low_body_under_the_conductors_of_a_tower_needs_a_span(window, north, 
     assert found[0].height == HEIGHT
 
 
+def test_a_tree_that_seems_to_reach_up_to_the_conductors_does_not_replace_the_tower(window):
+    bushy = Profile(0.0, 0.0, 2.5, 2.5, HEIGHT, 0.34, 0.5)
+    tree = body(window, 2.0, 20.0, height=HEIGHT + 0.01, profile=bushy)
+    points = surroundings_in(window.xyz)
+    (tower,) = distinct_towers([measured(tree), measured(body(window, 0.0))], points)
+    assert tower.y == window.foot[1]
+
+
 def test_a_pole_may_stand_near_a_tower(window):
     thin = Profile(0.0, 0.0, 0.2, 0.2, HEIGHT, 0.8, 0.5)
     pole = body(window, 2.0, 12.0, height=14.0, profile=thin)

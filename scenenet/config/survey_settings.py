@@ -38,12 +38,5 @@ class Synthetic(Settings):
     temporary: bool = Field(
         False,
         description="delete the files of the synthetic surveys once their crops are cut; they are "
-        "made again when a stage has to read them. They are .las files, which are eight times as "
-        "large as .laz and read in a third of the time",
+        "made again when a stage has to read them",
     )
-
-    @property
-    def suffix(self) -> str:
-        """Suffix of the files. One that is soon deleted is not worth compressing: it would be
-        compressed twice, with its truth, and decompressed five times."""
-        return ".las" if self.temporary else ".laz"

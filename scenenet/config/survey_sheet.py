@@ -180,7 +180,7 @@ def _read_row(row: dict[str, str], config: Config, root: Path) -> tuple[Survey |
         return None, problems
     path = str(Path(path).expanduser())
     made = {
-        str(Path(config.results_dir, "synthetic", f"{survey.name}{config.synthetic.suffix}"))
+        str(Path(config.results_dir, "synthetic", f"{survey.name}.laz"))
         for survey in config.synthetic.surveys
     }
     synthetic = path in made
@@ -231,7 +231,7 @@ def _path_problems(path: str, written: str, role: str, root: Path, config: Confi
     if written.startswith(RESULTS) or where.parent.name == "synthetic":
         names = [survey.name for survey in config.synthetic.surveys]
         close = difflib.get_close_matches(where.stem, names, n=1)
-        made = f"{RESULTS}/synthetic/{close[0]}{config.synthetic.suffix}" if close else ""
+        made = f"{RESULTS}/synthetic/{close[0]}.laz" if close else ""
         hint = f", did you mean {made}?" if close else ""
         return [f"{path} is not there, and no entry of synthetic.surveys makes it{hint}"]
     if not where.parent.is_dir():

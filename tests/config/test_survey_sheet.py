@@ -111,15 +111,6 @@ def test_the_path_of_a_synthetic_survey_follows_the_result_folder(root):
     assert read(root, row, results_dir="elsewhere")[0].path == "elsewhere/synthetic/made.laz"
 
 
-def test_a_temporary_synthetic_survey_is_not_compressed(root):
-    temporary = {"surveys": [{"name": "made"}], "temporary": True}
-    row = "corridor\t{results_dir}/synthetic/made.%s\tedp\ttrain"
-    (survey,) = read(root, row % "las", synthetic=temporary)
-    assert (survey.path, survey.origin) == ("results/synthetic/made.las", "synthetic")
-    said = complaint(root, row % "laz", synthetic=temporary)
-    assert "did you mean {results_dir}/synthetic/made.las?" in said
-
-
 def test_an_absolute_path_is_not_changed(root):
     path = str(root / "data" / "north.laz")
     assert read(root, f"north\t{path}\tedp\ttrain")[0].path == path

@@ -131,8 +131,7 @@ def tower_list(survey):
 
 def truth_of(survey):
     """The file with the true classes of a survey, in a list; an empty one for a recorded survey."""
-    path = Path(SURVEYS[survey].path)
-    truth = str(path.with_suffix(f".truth{settings.synthetic.suffix}"))
+    truth = str(Path(SURVEYS[survey].path).with_suffix(".truth.laz"))
     return [truth] if SURVEYS[survey].origin == "synthetic" else []
 
 

@@ -3,8 +3,8 @@
 
 rule synthesize:
     output:
-        survey=made_for_crops(f"{R}/synthetic/{{synthetic}}{settings.synthetic.suffix}"),
-        truth=made_for_crops(f"{R}/synthetic/{{synthetic}}.truth{settings.synthetic.suffix}"),
+        survey=made_for_crops(f"{R}/synthetic/{{synthetic}}.laz"),
+        truth=made_for_crops(f"{R}/synthetic/{{synthetic}}.truth.laz"),
         towers=f"{R}/synthetic/{{synthetic}}.towers.geojson",
         provenance=f"{R}/synthetic/{{synthetic}}.provenance.json",
     log:

@@ -8,7 +8,7 @@ import numpy as np
 
 from scenenet.core.progress import labelled, track_if
 from scenenet.detection.bends import pass_without_bend
-from scenenet.detection.candidates import SURROUNDINGS_M, DetectedVoxels
+from scenenet.detection.candidates import SURROUNDINGS_M
 from scenenet.detection.conductor_rules import (
     FAR,
     FURTHEST_M,
@@ -18,6 +18,7 @@ from scenenet.detection.conductor_rules import (
     WIDEST_HEAD_M,
 )
 from scenenet.detection.conductors import ConductorPoints, Span
+from scenenet.detection.detected_voxels import DetectedSurvey
 from scenenet.detection.distinct import distinct_towers, same_axis
 from scenenet.detection.following import leads_on
 from scenenet.detection.measure_structure import measure_structure
@@ -35,7 +36,7 @@ AHEAD = 6
 
 
 def find_towers(
-    detected: DetectedVoxels,
+    detected: DetectedSurvey,
     surroundings: Surroundings,
     points: Surroundings,
     tau: float,
@@ -54,8 +55,6 @@ def find_towers(
         tau: threshold of the model.
         progress: start of the labels of the progress on stderr; None shows no progress.
     """
-    if len(detected) == 0:
-        return []
     offset, voxel_size = detected.offset, detected.voxel_size
     rough = rough_towers(detected, surroundings, settings, progress)
     conductors = ConductorPoints(points, HEAD * settings.min_height)

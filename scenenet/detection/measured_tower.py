@@ -24,7 +24,8 @@ class MeasuredTower:
         upright: share of the levels from foot to top with a point of its body.
         spans: directions in which conductors leave, the longest first.
         probability: highest probability of its voxels.
-        voxels: rows of its detected voxels in the arguments of ``find_towers``.
+        place, reach: (2,) m, relative to the offset of the detected voxels, and m: within which
+            planar radius of which place its detected voxels lie.
         structure: its shape, which says which points are its own.
     """
 
@@ -37,7 +38,8 @@ class MeasuredTower:
     upright: float
     spans: tuple[Span, ...]
     probability: float
-    voxels: np.ndarray
+    place: np.ndarray
+    reach: float
     structure: Structure
 
     @classmethod
@@ -57,12 +59,13 @@ class MeasuredTower:
             upright=structure.upright,
             spans=tuple(span.without_places() for span in spans),
             probability=rough.probability,
-            voxels=rough.voxels,
+            place=np.array([rough.place_x, rough.place_y]),
+            reach=rough.reach,
             structure=structure,
         )
 
     def moved(self, offset: np.ndarray) -> MeasuredTower:
-        """The same tower elsewhere; ``offset`` is (3,) m."""
+        """The same tower elsewhere, but for ``place``; ``offset`` is (3,) m."""
         x, y, z = offset.tolist()
         structure = self.structure.moved(x, y, z)
         return replace(self, x=self.x + x, y=self.y + y, base=self.base + z, structure=structure)

@@ -5,7 +5,9 @@ They say where to look. Points decide (``scenenet.detection.find``).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
+from typing import overload
 
 import numpy as np
 
@@ -13,16 +15,19 @@ from scenenet.core.progress import labelled, track_if
 from scenenet.detection.body import centre_body, measure_body
 from scenenet.detection.candidates import (
     SURROUNDINGS_M,
-    DetectedVoxels,
     DistinctPlaces,
     axes,
     neighbours_adjacent,
 )
+from scenenet.detection.detected_voxels import DetectedSurvey
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import Surroundings
 
 LOOSE = 0.75
 """Share of the thresholds of height and continuity that a rough tower has to reach."""
+
+BLOCK_M = 1000.0
+"""m, edge of the blocks in which axes are looked at one after another."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +39,7 @@ class RoughTower:
         base: m, elevation of the ground at its foot.
         height: m, from the base to its top.
         probability: highest probability of its voxels.
-        detected: the detected voxels of the survey.
-        place, reach: (2,) m and m, where its own voxels lie; a long survey has too many rough
-            towers to keep the voxels of each.
+        place_x, place_y, reach: m, within which planar radius of which place its own voxels lie.
     """
 
     x: float
@@ -44,22 +47,39 @@ class RoughTower:
     base: float
     height: float
     probability: float
-    detected: DetectedVoxels
-    place: np.ndarray
+    place_x: float
+    place_y: float
     reach: float
 
-    @property
-    def voxels(self) -> np.ndarray:
-        """Rows of its detected voxels."""
-        return self.detected.within(self.place, self.reach)
+
+class RoughTowers(Sequence[RoughTower]):
+    """Rough towers, of which a long survey has too many to keep an object for each."""
+
+    def __init__(self, rows: np.ndarray) -> None:
+        """``rows`` (N, 8) has the attributes of each, in their order."""
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @overload
+    def __getitem__(self, at: int) -> RoughTower: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> RoughTowers: ...
+
+    def __getitem__(self, at: int | slice) -> RoughTower | RoughTowers:
+        if isinstance(at, slice):
+            return RoughTowers(self._rows[at])
+        return RoughTower(*self._rows[at].tolist())
 
 
 def rough_towers(
-    detected: DetectedVoxels,
+    detected: DetectedSurvey,
     surroundings: Surroundings,
     settings: DetectionSettings,
     progress: str | None = None,
-) -> list[RoughTower]:
+) -> RoughTowers:
     """The rough towers at the axes of the detected voxels, relative to ``detected.offset``.
 
     Axes are half of ``settings.eps`` apart, so a tower may have several.
@@ -67,19 +87,24 @@ def rough_towers(
     Args:
         progress: start of the labels of the progress on stderr; None shows no progress.
     """
-    found: list[RoughTower] = []
-    places, offset = DistinctPlaces(), detected.offset
-    searched = axes(detected, settings, settings.eps / 2, labelled(progress, "columns searched"))
-    for axis in track_if(neighbours_adjacent(searched), labelled(progress, "axes looked at")):
+    offset = detected.offset
+    label = labelled(progress, "areas searched")
+    searched = neighbours_adjacent(axes(detected, settings, settings.eps / 2, label))
+    rows = np.full((len(searched), len(fields(RoughTower))), np.nan)
+    # Block by block, because ``detected`` has not all in memory.
+    order = np.lexsort((np.arange(len(searched)), *(searched // BLOCK_M).T))
+    for row in track_if(order, labelled(progress, "axes looked at")):
+        axis = searched[row]
         around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
         tower = _measure(detected, axis, around, settings)
-        if tower is not None and places.add(tower.x, tower.y):
-            found.append(tower)
-    return found
+        if tower is not None:
+            rows[row] = astuple(tower)
+    rows, places = rows[~np.isnan(rows[:, 0])], DistinctPlaces()
+    return RoughTowers(rows[[places.add(x, y) for x, y in rows[:, :2].tolist()]])
 
 
 def _measure(
-    detected: DetectedVoxels, axis: np.ndarray, around: np.ndarray, settings: DetectionSettings
+    detected: DetectedSurvey, axis: np.ndarray, around: np.ndarray, settings: DetectionSettings
 ) -> RoughTower | None:
     """The rough tower on an axis (2,) m, or None if there is none.
 
@@ -88,19 +113,21 @@ def _measure(
     """
     size, foot_radius = detected.voxel_size, settings.foot_radius
     min_height, min_upright = LOOSE * settings.min_height, LOOSE * settings.min_upright
-    seen = detected.within(axis, settings.eps / 2)
-    body = measure_body(around, axis, detected.z[seen], foot_radius, size)
+    voxels = detected.around(axis, settings.eps / 2)
+    seen = voxels.within(axis, settings.eps / 2)
+    body = measure_body(around, axis, voxels.z[seen], foot_radius, size)
     if body.height < min_height:
         return None
     # The reach of the crossarms follows from the height.
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
-    place, seen = axis, detected.within(axis, crossarm)
+    voxels = detected.around(axis, crossarm)
+    place, seen = axis, voxels.within(axis, crossarm)
     axis, free = centre_body(around, axis, body, size)
     if not free:
         return None
-    body = measure_body(around, axis, detected.z[seen], foot_radius, size)
+    body = measure_body(around, axis, voxels.z[seen], foot_radius, size)
     if body.height < min_height or body.upright < min_upright:
         return None
-    peak = float(detected.probability[seen].max())
-    x, y = axis.tolist()
-    return RoughTower(x, y, body.base, body.height, peak, detected, place, crossarm)
+    peak = float(voxels.probability[seen].max())
+    (x, y), (place_x, place_y) = axis.tolist(), place.tolist()
+    return RoughTower(x, y, body.base, body.height, peak, place_x, place_y, crossarm)

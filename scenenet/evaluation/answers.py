@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenenet.dataset.voxels import VoxelGrid, VoxelSample, voxelise
-from scenenet.detection.candidates import DetectedVoxels
+from scenenet.detection.detected_voxels import DetectedVoxels
 from scenenet.detection.find import find_towers
 from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.settings import DetectionSettings

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, replace
 from math import hypot, inf
 from typing import Any
 
 import numpy as np
 
-from scenenet.detection.candidates import DetectedVoxels
+from scenenet.detection.detected_voxels import DetectedSurvey, DetectedVoxels
 from scenenet.detection.edge_distance import MAX_M, edge_distance
 from scenenet.detection.find import find_towers
 from scenenet.detection.measured_tower import MeasuredTower
@@ -17,6 +17,7 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import SurveyTower
 from scenenet.detection.tower_ids import tower_ids
 from scenenet.prediction.surroundings import occupied_voxels, survey_points
+from scenenet.prediction.survey_detections import SurveyDetections
 from scenenet.prediction.work.structures import Owners, Structures
 from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tiling import TileSpool
@@ -103,7 +104,8 @@ def find_in_survey(search: TowerSearch, progress: str | None = None) -> FoundTow
         progress: start of the labels of the progress on stderr; None shows no progress.
     """
     threshold = search.settings.threshold(search.tau)
-    return _find(search, *search.predictions.detected(search.spool, threshold), progress)
+    detected = SurveyDetections(search.spool, search.predictions, threshold)
+    return _find(search, detected, detected.shares, progress)
 
 
 def find_near(search: TowerSearch, place: np.ndarray, radius: float) -> FoundTowers:
@@ -115,24 +117,29 @@ def find_near(search: TowerSearch, place: np.ndarray, radius: float) -> FoundTow
     columns = spool.columns()
     around = spool.lattice.columns((low[0], high[0]), (low[1], high[1]))
     codes = [code for column in around for code in columns.get(column, ())]
-    zyx, probability, shares = search.predictions.detected(spool, 0.0, codes)
-    inside = np.hypot(*(spool.centres(zyx)[:, :2] - place).T) <= radius
+    zyx, probability, shares = search.predictions.detected(0.0, codes)
+    centres = spool.centres(zyx)
+    inside = np.hypot(*(centres[:, :2] - place).T) <= radius
     # Axes are means weighted by probability, so none may be 0.
     at_least = np.maximum(probability[inside], np.finfo(np.float32).tiny)
-    return _find(search, zyx[inside], at_least, shares[inside])
+    detected = DetectedVoxels(centres[inside], at_least, spool.voxel_size)
+    return _find(search, detected, lambda *near: shares[inside][detected.within(*near)])
 
 
 def _find(
     search: TowerSearch,
-    zyx: np.ndarray,
-    probability: np.ndarray,
-    shares: np.ndarray,
+    detected: DetectedSurvey,
+    shares: Callable[[np.ndarray, float], np.ndarray],
     progress: str | None = None,
 ) -> FoundTowers:
-    """The towers among voxels (``TilePredictions.detected``)."""
+    """The towers among detected voxels.
+
+    Args:
+        shares: gives the contributions (n, K) to the voxels within a radius in m of a place (2,) m
+            relative to their offset.
+    """
     spool = search.spool
     occupied, points = occupied_voxels(spool), survey_points(spool)
-    detected = DetectedVoxels(spool.centres(zyx), probability, spool.voxel_size)
     found = find_towers(detected, occupied, points, search.tau, search.settings, progress)
     numbers = tower_ids(np.array([(tower.x, tower.y) for tower in found]).reshape(-1, 2))
     shapes = (tower.structure for tower in found)
@@ -144,7 +151,7 @@ def _find(
         inside = near[tower.structure.contains(near)]
         n_own = int(np.count_nonzero(owners(inside) == number))
         distance = edge_distance(place, occupied(place, MAX_M * 1.5)[:, :2])
-        means = shares[tower.voxels].mean(axis=0).tolist()
+        means = shares(tower.place, tower.reach).mean(axis=0).tolist()
         contributions = dict(zip(search.predictions.geneos, means, strict=True))
         entry = _entry(tower, number, n_own, distance, contributions)
         towers.append(entry.in_units(search.unit_sizes))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenenet.detection.candidates import DetectedVoxels
+from scenenet.detection.detected_voxels import DetectedVoxels
 from scenenet.detection.find import find_towers
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in

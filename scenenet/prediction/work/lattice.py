@@ -111,3 +111,9 @@ def place_of(code: int) -> tuple[int, int, int]:
         ((code >> _BITS) & mask) - _BIAS,
         (code & mask) - _BIAS,
     )
+
+
+def on_lattice(place: tuple[int, int, int], voxel: np.ndarray) -> np.ndarray:
+    """(M, 3) int64 zyx on the lattice of the voxels (M,) of the tile at ``place`` (z, y, x)."""
+    local = np.stack(np.unravel_index(voxel, (EDGE,) * 3), axis=1)
+    return local + np.asarray(place, np.int64) * EDGE

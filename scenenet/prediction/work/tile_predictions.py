@@ -11,8 +11,7 @@ import numpy as np
 
 from scenenet.pointcloud.targets import Target
 from scenenet.prediction.work.block_file import BlockFile
-from scenenet.prediction.work.lattice import Lattice
-from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.lattice import Lattice, on_lattice, place_of
 
 if TYPE_CHECKING:
     from scenenet.models.base import VoxelModel
@@ -99,22 +98,20 @@ class TilePredictions:
         return self._cached(code)
 
     def detected(
-        self, spool: TileSpool, threshold: float, codes: Iterable[int] | None = None
+        self, threshold: float, codes: Iterable[int]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The voxels with probability >= ``threshold``: lattice positions (V, 3) int32,
-        probability (V,) and shares (V, K), in a fixed order.
-
-        Args:
-            codes: of the tiles to look at; None for all.
-        """
+        """The voxels with probability >= ``threshold`` in the tiles with ``codes``: lattice
+        positions (V, 3) int32, probability (V,) and shares (V, K), in an order that does not depend
+        on that of the codes."""
         zyx = [np.empty((0, 3), np.int32)]
         probability = [np.empty(0, np.float32)]
         shares = [np.empty((0, len(self.geneos)), np.float32)]
-        for code in (code for code, _ in spool.places()) if codes is None else sorted(codes):
+        for code in sorted(codes):
             prediction = self.read(code)
             found = prediction.probability >= threshold
             if found.any():
-                zyx.append(spool.tile(code).zyx()[found].astype(np.int32))
+                positions = on_lattice(place_of(code), prediction.voxel[found])
+                zyx.append(positions.astype(np.int32))
                 probability.append(prediction.probability[found])
                 shares.append(prediction.shares[found])
         return np.concatenate(zyx), np.concatenate(probability), np.concatenate(shares)

@@ -18,7 +18,7 @@ import numpy as np
 
 from scenenet.core.compilation import EXACT
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
-from scenenet.prediction.work.lattice import EDGE, Lattice, codes_of, groups, place_of
+from scenenet.prediction.work.lattice import EDGE, Lattice, codes_of, groups, on_lattice, place_of
 
 KEPT_TILES = 128
 """Tiles in memory, 8 or 16 bytes a voxel: a tile and its neighbours are asked for again by the next
@@ -83,8 +83,7 @@ class Tile:
 
     def zyx(self) -> np.ndarray:
         """(M, 3) int64 positions on the lattice."""
-        local = np.stack(np.unravel_index(self.voxel, (EDGE,) * 3), axis=1)
-        return local + np.asarray(self.place, np.int64) * EDGE
+        return on_lattice(self.place, self.voxel)
 
 
 class SpoolWriter:

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from scenenet.detection.candidates import DetectedVoxels
 from scenenet.detection.conductor_rules import FAR, FURTHEST_M
+from scenenet.detection.detected_voxels import DetectedVoxels
 from scenenet.detection.find import find_towers
 from scenenet.detection.measured_tower import MeasuredTower
 from scenenet.detection.settings import DetectionSettings

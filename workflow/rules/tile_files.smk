@@ -28,7 +28,11 @@ NUMBERS = {survey: {tile: n for n, tile in enumerate(plan.tiles)} for survey, pl
 
 def together(stage):
     """The group of the jobs of a stage: tiles that follow one another. Snakemake joins all
-    components of one name again and again, each time that it plans, so the name has the limit."""
+    components of one name again and again, each time that it plans, so the name has the limit.
+
+    None inside the job of a scheduler, where the group is no longer needed (``tiles.smk``)."""
+    if workflow.remote_exec:
+        return None
 
     def group(w):
         name = f"{stage}-{w.survey}-{NUMBERS[w.survey][w.tile] // TOGETHER}"

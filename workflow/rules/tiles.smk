@@ -403,3 +403,14 @@ rule survey_complete:
         "Looking whether all tiles of {wildcards.survey} are predicted"
     script:
         "../scripts/survey_complete.py"
+
+
+# Inside the job of a scheduler the process that runs a group takes its tiles itself, one after another. As jobs of
+# the scheduler's own executor each of them would start Snakemake once more, which takes longer than a tile.
+if workflow.remote_exec:
+
+    localrules:
+        read_tile,
+        predict_tile,
+        observe_tile,
+        write_tile,

@@ -53,6 +53,9 @@ BENT_M, BENT_RMSE_M, CLOSER = 40.0, 2 * NOISE_M, 0.7
 """m, length and m, root mean square distance from which a wire may be two that meet at a crossarm,
 and share of this distance at which a part of it must be nearer to its points."""
 
+GROWN_M = 0.5
+"""m that a wire grows by, at least, when it is fitted again to what it holds."""
+
 PRIOR_SPREAD = 0.15
 """Standard deviation of the curvature of wires of a span, as a share of their median."""
 
@@ -109,15 +112,15 @@ def trace_wires(
                 break
             guesses = _Guesses(pieces, left, window)
             continue
-        fit = _fit(stz, pieces, support, free, _prior(found))
+        fit, search = _fit(stz, pieces, support, free, _prior(found)), _supported
         while fit is not None and _may_bend(fit):
             part = _to_bend(pieces, support, fit, window)
             closer = _fit(stz, pieces, part, free, _prior(found))
             if closer is None or closer.rmse > CLOSER * fit.rmse:
                 break
-            support, fit = part, closer
+            support, fit, search = part, closer, _whole
         left[support] = False
-        wire = None if fit is None else _supported(stz, fit, free, window, gap)
+        wire = None if fit is None else search(stz, fit, free, window, gap)
         if wire is None:
             continue
         # Pieces beside a wire are of its bundle or its noise.
@@ -221,6 +224,21 @@ def _near(pieces: Pieces, catenary: Catenary, beyond: float) -> np.ndarray:
     along, _ = catenary.along(pieces.middle)
     inside = (along >= -beyond) & (along <= catenary.length + beyond)
     return inside & (distance <= APART_M)
+
+
+def _whole(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float, gap: float) -> Wire | None:
+    """``_supported`` for a fit to a part of a wire.
+
+    The further away, the less certain is what such a fit says of the rest. The fit to all that it
+    reaches is better, so the wire grows until it is found up to its ends.
+    """
+    wire = _supported(stz, fit, free, window, gap)
+    while wire is not None:
+        longer = _supported(stz, wire.fit, free, window, gap)
+        if longer is None or longer.fit.catenary.length < wire.fit.catenary.length + GROWN_M:
+            break
+        wire = longer
+    return wire
 
 
 def _supported(

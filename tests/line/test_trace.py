@@ -21,6 +21,12 @@ def catenary(t: float, z: float) -> Catenary:
     return Catenary((0.0, t, z), (280.0, t + 1.5, z + 6.0), 1200.0)
 
 
+def shifted(wire: Catenary, t: float) -> Catenary:
+    """The same wire, moved by t m to the left."""
+    (x, y, z), (far_x, far_y, far_z) = wire.start, wire.end
+    return Catenary((x, y + t, z), (far_x, far_y + t, far_z), wire.parameter)
+
+
 def nearest(wires, true: Catenary) -> float:
     """m, median distance of a true wire from the nearest one found."""
     places = true.at_shares(np.linspace(0.1, 0.9, 30))
@@ -55,6 +61,22 @@ def test_a_gap_is_bridged_where_the_catenary_says_so():
     assert wire.fit.catenary.length > 270
     assert 0.75 < wire.covered < 0.9
     assert nearest([wire], catenary(0.0, 25.0)) < 0.03
+
+
+@pytest.mark.parametrize("seed", [5, 8, 21, 22])
+def test_a_bundle_over_a_crown_is_found_from_end_to_end(seed):
+    """Its first fit goes from one wire of the bundle to the other, and holds a part of them."""
+    rng = np.random.default_rng(seed)
+    true = [
+        Catenary((0.0, t, z), (190.0, t + 1.2, z - 22.0), 1600.0)
+        for t in (-9.5, -0.5)
+        for z in (279.0, 284.0, 288.6)
+    ]
+    pairs = [shifted(wire, t) for wire in true for t in (-0.2, 0.2)]
+    crown = rng.normal((84.0, -9.6, 263.5), (4.0, 2.0, 1.2), (150, 3))
+    wires = trace_wires(np.concatenate([*(points_on(w, 2.3, rng) for w in pairs), crown]))
+    assert len(wires) == len(true)
+    assert min(wire.fit.catenary.length for wire in wires) > 185
 
 
 def test_wires_that_meet_at_a_crossarm_are_two():

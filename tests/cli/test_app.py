@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
 import typer
@@ -108,6 +109,18 @@ def test_a_synthetic_survey_has_as_many_points_as_its_truth(tmp_path):
     assert made.returncode == 0, made.stderr
     reports = json.loads(scenenet("check", survey, truth, "--json").stdout)
     assert reports[0]["n_points"] == reports[1]["n_points"] > 100_000
+
+
+def test_a_continuous_synthetic_line_goes_on_beyond_its_towers(tmp_path):
+    lengths = []
+    for name, options in (("gaps.laz", ()), ("whole.laz", ("--continuous",))):
+        made = scenenet("synth", tmp_path / name, "--towers", 2, *options)
+        assert made.returncode == 0, made.stderr
+        with laspy.open(tmp_path / name) as file:
+            lengths.append(np.hypot(*(file.header.maxs - file.header.mins)[:2]))
+    assert lengths[1] > lengths[0] + 50
+    again = scenenet("synth", tmp_path / "whole.laz", "--towers", 1)
+    assert "whole.laz replaced" in again.stdout and "1 tower\n" in again.stdout
 
 
 def test_check_prints_a_table_for_people(survey):

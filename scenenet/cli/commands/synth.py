@@ -12,8 +12,12 @@ from scenenet.cli.output import show
 
 EXAMPLES = (
     "scenenet synth line.laz --towers 20 --seed 1 --truth truth.laz",
+    "scenenet synth line.laz --towers 12 --continuous",
     "scenenet synth tiles/ --towers 300 --tiles 40",
 )
+
+BEYOND_M = 30.0
+"""m, of a survey without gaps beyond its first and last tower."""
 
 
 def command(
@@ -30,6 +34,14 @@ def command(
             min=1, help="Cut the survey across the line into so many files, in the folder OUT."
         ),
     ] = None,
+    continuous: Annotated[
+        bool,
+        typer.Option(
+            "--continuous",
+            help="One survey without gaps that goes on beyond the first and the last tower. The "
+            "default has gaps and ends at towers, as the files of TS40K do.",
+        ),
+    ] = False,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
@@ -48,6 +60,10 @@ def command(
     paths = [path if name is None else path / name for path in surveys for name in names]
     outputs = [Output(path, is_synthetic_survey) for path in paths]
     check_outputs(outputs, [], overwrite=overwrite)
-    settings = SyntheticSettings(towers=towers, seed=seed)
+    whole = {"section": 0, "margin": BEYOND_M} if continuous else {}
+    settings = SyntheticSettings(towers=towers, seed=seed, **whole)
+    replaced = any(output.path.exists() for output in outputs)
     summary = make_survey(settings, out, truth=truth, progress=out.name, tiles=tiles)
-    show(summary, as_json, lambda s: [f"{out}: {s['points']:,} points, {towers} towers"])
+    done = f"{out}{' replaced' if replaced else ''}"
+    counted = f"{towers} {'tower' if towers == 1 else 'towers'}"
+    show(summary, as_json, lambda s: [f"{done}: {s['points']:,} points, {counted}"])

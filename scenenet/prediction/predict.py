@@ -15,6 +15,7 @@ from typing import TypeVar
 from scenenet.clearance.records import SurveyClearances
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.files import read_json, write_json
+from scenenet.core.free_memory import give_back
 from scenenet.core.outputs import check_space
 from scenenet.core.progress import quiet, track
 from scenenet.core.scratch import scratch_folder, temporary_directory
@@ -98,13 +99,16 @@ def predict_survey(
     with nullcontext(work) if work is not None else _scratch() as folder:
         classes = scheme is not None and finds_lines(used)
         _read_files(survey, folder, layers, settings.chunk_points, classes=classes)
+        give_back()
         joined = SurveyWork.open(survey, folder.reads(survey))
         tiles = [_predict_files(joined, folder, each) for each in used]
+        give_back()
         found = FoundTowers.none()
         search = TowerSearch(joined.spool, tiles[0], joined.system.unit_sizes, tau, detection)
         if first.target.is_tower:
             if not folder.towers.exists():
                 write_json(folder.towers, find_in_survey(search, survey.given.name).to_json())
+            give_back()
             found = FoundTowers.from_json(read_json(folder.towers))
         further = [
             FurtherModel(each, joined.spool_at(each.layer), predicted)

@@ -21,8 +21,8 @@ KEPT_TILES = 64
 KEPT_POINTS = 9
 """Tiles of points kept in memory: those around a tower. A tile of a dense survey takes 30 MB."""
 
-KEPT_IN_ALL = 2_000_000
-"""Positions kept in memory, in more tiles where they are small: 80 MB. On a slope, more tiles than
+KEPT_IN_ALL = 1_000_000
+"""Positions kept in memory, in more tiles where they are small: 24 MB. On a slope, more tiles than
 ``KEPT_POINTS`` are around a tower."""
 
 

@@ -13,6 +13,7 @@ from scenenet.clearance.records import SurveyClearances
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic, write_json
+from scenenet.core.free_memory import give_back
 from scenenet.core.provenance import fingerprint, package_version
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.survey_tower import row_types
@@ -113,6 +114,7 @@ def _write_all(
                 copc = stack.enter_context(atomic(copc_of(target)))
                 write_copc(partial, copc)
                 written[files.key(copc_of(target))] = fingerprint(copc)
+        give_back()
         summary = _write_lists(stack, replace(prediction, files=read), files, written)
     files.unfinished.unlink(missing_ok=True)
     for path in outdated:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections import defaultdict
 from collections.abc import Iterable, Mapping, Set
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -64,7 +63,7 @@ class BlockFile:
             InputError: the file cannot be read, or is not a whole file of blocks.
         """
         self.path = Path(path)
-        self._blocks: dict[str, dict[int, list[tuple[int, int]]]] = {}
+        self._blocks: dict[str, np.ndarray] = {}
         try:
             with self.path.open("rb") as stream:
                 end = 16 + len(_MAGIC)
@@ -81,13 +80,9 @@ class BlockFile:
             raise InputError(error.strerror or "cannot be read", file=path) from None
         self.facts: dict[str, Any] = known["facts"]
         for number, kind in enumerate(known["kinds"]):
-            blocks: dict[int, list[tuple[int, int]]] = defaultdict(list)
             own = entries[entries["kind"] == number]
-            for code, offset, size in zip(
-                *(own[name].tolist() for name in ("code", "offset", "size")), strict=True
-            ):
-                blocks[code].append((offset, size))
-            self._blocks[kind] = dict(blocks)
+            # In the order in which they were written, where a number has several.
+            self._blocks[kind] = own[np.argsort(own["code"], kind="stable")]
 
     @property
     def kinds(self) -> Set[str]:
@@ -96,17 +91,18 @@ class BlockFile:
 
     def codes(self, kind: str) -> Iterable[int]:
         """The numbers of the blocks of a kind."""
-        return self._blocks[kind].keys()
+        return np.unique(self._blocks[kind]["code"]).tolist()
 
     def read(self, kind: str, code: int, dtype: np.dtype) -> np.ndarray:
         """(n,) records of the block of a kind and a number; none where there is no such block."""
-        blocks = self._blocks[kind].get(code, ())
-        if not blocks:
+        blocks = self._blocks[kind]
+        first, last = np.searchsorted(blocks["code"], [code, code + 1]).tolist()
+        if first == last:
             return np.empty(0, dtype)
         parts = []
         # No open file is kept: a survey has thousands of these, and processes may share this one.
         with self.path.open("rb", buffering=0) as stream:
-            for offset, size in blocks:
+            for _, _, offset, size in blocks[first:last].tolist():
                 data = os.pread(stream.fileno(), size, offset)
                 if len(data) != size:
                     raise self._damaged()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,10 +49,16 @@ class SurveySystem:
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> SurveySystem:
         """The coordinates that ``to_json`` gave."""
-        import pyproj
-
-        crs = None if data["crs"] is None else pyproj.CRS(data["crs"])
+        crs = None if data["crs"] is None else _system(data["crs"])
         return cls(crs, tuple(data["unit_sizes"]), tuple(data["unit_names"]))
+
+
+@lru_cache(maxsize=16)
+def _system(text: str) -> pyproj.CRS:
+    """The system of a description; one object of 90 kB for all files of a survey."""
+    import pyproj
+
+    return pyproj.CRS(text)
 
 
 def in_metres(xyz: np.ndarray, unit_sizes: tuple[float, float, float]) -> np.ndarray:

@@ -42,6 +42,8 @@ def find_towers(
     tau: float,
     settings: DetectionSettings,
     progress: str | None = None,
+    *,
+    bent: bool = True,
 ) -> list[MeasuredTower]:
     """Find the towers among detected voxels and measure each in points, highest probability first.
 
@@ -54,11 +56,14 @@ def find_towers(
         points: gives the points around a position.
         tau: threshold of the model.
         progress: start of the labels of the progress on stderr; None shows no progress.
+        bent: whether what conductors pass without a bend is no tower.
     """
     offset, voxel_size = detected.offset, detected.voxel_size
     rough = rough_towers(detected, surroundings, settings, progress)
     conductors = ConductorPoints(points, HEAD * settings.min_height)
-    measurement = _Measurement(surroundings, points, conductors, offset, voxel_size, tau, settings)
+    measurement = _Measurement(
+        surroundings, points, conductors, offset, voxel_size, tau, settings, bent
+    )
     found: list[MeasuredTower] = []
     for coming in rough[: AHEAD - 1]:
         measurement.expect(coming)
@@ -82,6 +87,7 @@ class _Measurement:
         voxel_size: m.
         tau: threshold of the model.
         settings: of the detection.
+        bent: whether what conductors pass without a bend is no tower.
     """
 
     surroundings: Surroundings
@@ -91,6 +97,7 @@ class _Measurement:
     voxel_size: float
     tau: float
     settings: DetectionSettings
+    bent: bool
 
     def expect(self, rough: RoughTower) -> None:
         """Begin to look for the conductors at a rough tower."""
@@ -137,8 +144,8 @@ class _Measurement:
             spans = self._leading_on(shape)
             if not replace(shape, spans=spans).carries(needed):
                 continue
-            wide = shape.profile.width > POLE_M
-            if wide and pass_without_bend(spans, np.array([shape.x, shape.y])):
+            tested = self.bent and shape.profile.width > POLE_M
+            if tested and pass_without_bend(spans, np.array([shape.x, shape.y])):
                 continue
             tower = MeasuredTower.of(rough, shape, spans)
             if not any(same_axis(tower, other) for other in found):

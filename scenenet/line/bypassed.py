@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenenet.detection.conductor_rules import BEND, SECTOR
+from scenenet.detection.conductor_rules import BEND, POLE_M, SECTOR
 from scenenet.line.frame import SpanFrame
 from scenenet.line.graph import STRAY
 from scenenet.line.records import Conductor, LineSpan
@@ -27,9 +27,10 @@ def bypassed_towers(
 ) -> set[int]:
     """Ids of the towers beside a span between two others that have no conductors but those of it.
 
-    Such a tower holds no wire, and those of the span pass further above it than it can hold them;
-    or it holds few of them in the direction of the span, whose conductors would bend there if they
-    were carried. A tower from which a wire leads to a third one is of another line.
+    Such a tower holds no wire, and those of the span pass further above it than it can hold them,
+    or would bend there if something wider than a pole held them; or it holds few of them in the
+    direction of the span, whose conductors would bend there if they were carried. A tower from
+    which a wire leads to a third one is of another line.
 
     Args:
         towers: of the survey, m.
@@ -65,12 +66,15 @@ def _passes(
     places = [_beside(wire, tower) for wire in wires]
     if min(abs(beside) for beside, _ in places) > CROWN_M:
         return False
+    bend = span.length / (4 * float(np.median([wire.c for wire in wires])))
     if not held:
         bearings = np.radians(tower.bearings)
         ways = np.column_stack((np.sin(bearings), np.cos(bearings)))
-        return bool(_along(ways, frame).any()) and not any(tower.holds(z) for _, z in places)
+        # A pole at their height may be of another line, whose wires were not traced.
+        wide = tower.width is not None and tower.width > POLE_M
+        unheld = (wide and bend >= BEND) or not any(tower.holds(z) for _, z in places)
+        return bool(_along(ways, frame).any()) and unheld
     ways = np.array([wire.catenary.direction for each in held for wire in each])
-    bend = span.length / (4 * float(np.median([wire.c for wire in wires])))
     few = max(map(len, held)) < STRAY * len(wires)
     return few and bool(_along(ways, frame).all()) and bend >= BEND
 

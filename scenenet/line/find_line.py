@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -31,6 +31,10 @@ so long, m: telephone cables and those to houses."""
 SLACK = 0.5
 """Share of the usual catenary parameter of a line below which a wire is a cable that ends at or
 passes a tower: telephone cables hang slacker than conductors."""
+
+BELOW_M = 2.0
+"""m, how much lower than all conductors that lead from its tower to another one a short wire is a
+cable: one on the same pole, or under the line."""
 
 SHOWN_M = 0.05
 """m, how much deeper than usual a wire hangs through from which it shows that it is slack: the
@@ -66,6 +70,7 @@ def find_line(
     lines = chains(traced)
     middles = [span.frame.to_map(np.array([[span.frame.length / 2, 0, 0]]))[0] for span in traced]
     ids = tower_ids(np.array(middles).reshape(-1, 3)[:, :2])
+    lowest = _lowest_held(traced)
     spans: list[LineSpan] = []
     conductors: list[Conductor] = []
     notes: list[LineNote] = []
@@ -73,7 +78,7 @@ def find_line(
     for chain in lines:
         own_spans = [traced[step.number] for step in chain.steps]
         usual = _usual_parameter(own_spans if len(own_spans) >= OWN_SPANS else traced)
-        cable = _is_cable(own_spans, usual)
+        cable = _is_cable(own_spans, usual, lowest)
         number += not cable
         for order, (step, angle) in enumerate(zip(chain.steps, chain.angles, strict=True), 1):
             span = _run_through(traced, chain, order - 1)
@@ -113,15 +118,45 @@ def find_line(
     return SurveyLine(tuple(spans), tuple(conductors), tuple(notes), tuple(held_by))
 
 
-def _is_cable(spans: Sequence[TracedSpan], usual: float) -> bool:
-    """Whether wires are those of no line: few and short ones that no tower holds, or all of them
-    slack."""
-    loose = all(
-        span.start is None and span.end is None and len(span.wires) <= CABLE_WIRES
-        and span.frame.length <= CABLE_M
-        for span in spans
-    )  # fmt: skip
-    return loose or all(_is_slack(wire.catenary, usual) for span in spans for wire in span.wires)
+def _is_cable(spans: Sequence[TracedSpan], usual: float, lowest: Mapping[int, float]) -> bool:
+    """Whether wires are those of no line: few and short ones that no tower holds, or that hang
+    below the conductors of their tower, or all of them slack.
+
+    Args:
+        usual: m, catenary parameter of the line.
+        lowest: of ``_lowest_held``.
+    """
+
+    def is_loose(span: TracedSpan) -> bool:
+        if len(span.wires) > CABLE_WIRES or span.frame.length > CABLE_M:
+            return False
+        if span.start is None and span.end is None:
+            return True
+        return (span.start is None or span.end is None) and all(
+            height < lowest.get(tower, -np.inf) - BELOW_M for tower, height in _attachments(span)
+        )
+
+    return all(map(is_loose, spans)) or all(
+        _is_slack(wire.catenary, usual) for span in spans for wire in span.wires
+    )
+
+
+def _lowest_held(spans: Sequence[TracedSpan]) -> dict[int, float]:
+    """Id of each tower with a span to another one -> m, elevation of its lowest wire of these."""
+    lowest: dict[int, float] = {}
+    for span in spans:
+        if span.start is not None and span.end is not None:
+            for tower, height in _attachments(span):
+                lowest[tower] = min(height, lowest.get(tower, np.inf))
+    return lowest
+
+
+def _attachments(span: TracedSpan) -> Iterator[tuple[int, float]]:
+    """The towers of a span, each with the elevation in m of each wire there."""
+    for wire in span.wires:
+        for tower, place in ((span.start, wire.catenary.start), (span.end, wire.catenary.end)):
+            if tower is not None:
+                yield tower.id, place[2]
 
 
 def _is_slack(curve: Catenary, usual: float) -> bool:

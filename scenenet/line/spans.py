@@ -36,6 +36,9 @@ MUCH_LOWER = 0.75
 """Share of the height of a tower below which one next to it is doubtful: two supports of a line
 that are so close to each other are about equally tall."""
 
+LONGEST_JIB_M = 80.0
+"""m, longest jib of a crane."""
+
 UNSEEN_M, UNSEEN_SHARE = 40.0, 0.35
 """m, and share of a span, that may be hidden between the first point of a wire and its tower; the
 greater of both. Between its points, as much as at both ends together."""
@@ -80,7 +83,21 @@ def find_spans(
             _add(span, found, free)
     for span in edge_spans(points, free, towers, found, seen):
         _add(span, found, free)
-    return found + lone_spans(points, free, towers)
+    return _without_jibs(found + lone_spans(points, free, towers))
+
+
+def _without_jibs(spans: Sequence[TracedSpan]) -> list[TracedSpan]:
+    """The spans without those that may be the jib of a crane: it leaves its mast in one direction
+    only, and no wire leads from there to a tower."""
+    linked = {t.id for s in spans if s.start and s.end for t in (s.start, s.end)}
+
+    def is_jib(span: TracedSpan) -> bool:
+        tower = span.start or span.end
+        if tower is None or tower.id in linked:
+            return False
+        return len(tower.bearings) == 1 and span.frame.length <= LONGEST_JIB_M
+
+    return [span for span in spans if not is_jib(span)]
 
 
 def _add(span: TracedSpan, found: list[TracedSpan], free: np.ndarray) -> None:

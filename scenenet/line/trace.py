@@ -112,15 +112,15 @@ def trace_wires(
                 break
             guesses = _Guesses(pieces, left, window)
             continue
-        fit, search = _fit(stz, pieces, support, free, _prior(found)), _supported
+        fit = _fit(stz, pieces, support, free, _prior(found))
         while fit is not None and _may_bend(fit):
             part = _to_bend(pieces, support, fit, window)
             closer = _fit(stz, pieces, part, free, _prior(found))
             if closer is None or closer.rmse > CLOSER * fit.rmse:
                 break
-            support, fit, search = part, closer, _whole
+            support, fit = part, closer
         left[support] = False
-        wire = None if fit is None else search(stz, fit, free, window, gap)
+        wire = None if fit is None else _whole(stz, fit, free, window, gap)
         if wire is None:
             continue
         # Pieces beside a wire are of its bundle or its noise.
@@ -227,13 +227,15 @@ def _near(pieces: Pieces, catenary: Catenary, beyond: float) -> np.ndarray:
 
 
 def _whole(stz: np.ndarray, fit: Fit, free: np.ndarray, window: float, gap: float) -> Wire | None:
-    """``_supported`` for a fit to a part of a wire.
+    """The wire with all its points and its true ends, or None if too little of it is seen.
 
-    The further away, the less certain is what such a fit says of the rest. The fit to all that it
-    reaches is better, so the wire grows until it is found up to its ends.
+    A fit may be to a part of a wire, or to one side of a bundle. The further away, the less certain
+    is what it says of the rest. The fit to all that it reaches is better, so the wire grows until
+    it is found up to its ends.
     """
     wire = _supported(stz, fit, free, window, gap)
-    while wire is not None:
+    longest = float(np.ptp(stz[:, 0])) - window
+    while wire is not None and wire.fit.catenary.length < longest:
         longer = _supported(stz, wire.fit, free, window, gap)
         if longer is None or longer.fit.catenary.length < wire.fit.catenary.length + GROWN_M:
             break

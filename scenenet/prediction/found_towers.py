@@ -110,8 +110,9 @@ def find_in_survey(search: TowerSearch, progress: str | None = None) -> FoundTow
 
 def find_near(search: TowerSearch, place: np.ndarray, radius: float) -> FoundTowers:
     """Find the towers within a radius in m of a place (2,) m, whatever the model says of the voxels
-    there. All other rules hold; a tower whose voxels are all below tau needs twice the length of
-    conductor.
+    there. A tower whose voxels are all below tau needs twice the length of conductor. Conductors
+    may pass it without a bend: in a dip they bend less than the few metres near an axis show, and
+    the line decides by whole spans. All other rules hold.
     """
     spool, (low, high) = search.spool, (place - radius, place + radius)
     columns = spool.columns()
@@ -123,7 +124,7 @@ def find_near(search: TowerSearch, place: np.ndarray, radius: float) -> FoundTow
     # Axes are means weighted by probability, so none may be 0.
     at_least = np.maximum(probability[inside], np.finfo(np.float32).tiny)
     detected = DetectedVoxels(centres[inside], at_least, spool.voxel_size)
-    return _find(search, detected, lambda *near: shares[inside][detected.within(*near)])
+    return _find(search, detected, lambda *near: shares[inside][detected.within(*near)], bent=False)
 
 
 def _find(
@@ -131,6 +132,8 @@ def _find(
     detected: DetectedSurvey,
     shares: Callable[[np.ndarray, float], np.ndarray],
     progress: str | None = None,
+    *,
+    bent: bool = True,
 ) -> FoundTowers:
     """The towers among detected voxels.
 
@@ -140,7 +143,9 @@ def _find(
     """
     spool = search.spool
     occupied, points = occupied_voxels(spool), survey_points(spool)
-    found = find_towers(detected, occupied, points, search.tau, search.settings, progress)
+    found = find_towers(
+        detected, occupied, points, search.tau, search.settings, progress, bent=bent
+    )
     numbers = tower_ids(np.array([(tower.x, tower.y) for tower in found]).reshape(-1, 2))
     shapes = (tower.structure for tower in found)
     structures = Structures(tuple(zip(numbers, shapes, strict=True)))

@@ -13,7 +13,7 @@ from scenenet.detection.surroundings import surroundings_in
 TAU, SIZE = 0.5, 1.0
 
 
-def find(xyz, feet, *, phase=(0.0, 0.0, 0.0), probability=0.9, height=15.0, **changes):
+def find(xyz, feet, *, phase=(0.0, 0.0, 0.0), probability=0.9, height=15.0, bent=True, **changes):
     """The towers when the voxels above each of ``feet`` are detected."""
     steps = np.unique(np.floor((xyz - phase) / SIZE), axis=0)
     occupied = (steps + 0.5) * SIZE + phase
@@ -29,6 +29,7 @@ def find(xyz, feet, *, phase=(0.0, 0.0, 0.0), probability=0.9, height=15.0, **ch
         surroundings_in(xyz),
         TAU,
         DetectionSettings(**changes),
+        bent=bent,
     )
 
 
@@ -147,3 +148,4 @@ FOOT = np.array([1000.3, 2000.7, 50.0])
 def test_a_tree_that_conductors_pass_without_a_bend_is_no_tower():
     assert len(find(under_conductors(0.15), [FOOT], height=14)) == 1
     assert find(under_conductors(0.0), [FOOT], height=14) == []
+    assert len(find(under_conductors(0.0), [FOOT], height=14, bent=False)) == 1

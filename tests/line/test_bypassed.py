@@ -33,7 +33,9 @@ def passing(known, line):
     return span, [wire for wire in line.conductors if wire.span_id == span.span_id]
 
 
-def tree(passing, under: float, beside: float = 2.0, turned: float = 0.0) -> LineTower:
+def tree(
+    passing, under: float, beside: float = 2.0, turned: float = 0.0, width: float = 0.6
+) -> LineTower:
     """A tree beside the lowest conductor, ``under`` m below it and ``beside`` m to its left, at
     which conductors seem to leave along the span, or ``turned`` degrees away."""
     _, wires = passing
@@ -44,7 +46,7 @@ def tree(passing, under: float, beside: float = 2.0, turned: float = 0.0) -> Lin
     height = 12.0
     x, y = x - beside * north, y + beside * east
     bearings = (bearing % 360, (bearing + 180) % 360)
-    return LineTower(TREE, x, y, z - under - height, height, 0.6, bearings)
+    return LineTower(TREE, x, y, z - under - height, height, width, bearings)
 
 
 def dropped(known, line, found: LineTower, spans=(), wires=()):
@@ -54,20 +56,24 @@ def dropped(known, line, found: LineTower, spans=(), wires=()):
 
 
 @pytest.mark.parametrize(
-    ("under", "beside", "turned", "expected"),
+    ("under", "beside", "turned", "width", "expected"),
     [
-        (ABOVE_TOP_M + 1.0, 2.0, 0.0, {TREE}),
-        # It may hold wires at this height: those of a line that was not traced.
-        (ABOVE_TOP_M - 1.0, 2.0, 0.0, set()),
+        (ABOVE_TOP_M + 1.0, 2.0, 0.0, 0.6, {TREE}),
+        # A pole may hold wires at this height: those of a line that was not traced.
+        (ABOVE_TOP_M - 1.0, 2.0, 0.0, 0.6, set()),
+        # What is wider would hold those of the span, and they do not bend.
+        (ABOVE_TOP_M - 1.0, 2.0, 0.0, 3.0, {TREE}),
         # Its conductors cross those of the span, or pass far from it: it is of another line.
-        (ABOVE_TOP_M + 1.0, 2.0, 60.0, set()),
-        (ABOVE_TOP_M + 1.0, 9.0, 0.0, set()),
+        (ABOVE_TOP_M + 1.0, 2.0, 60.0, 0.6, set()),
+        (ABOVE_TOP_M + 1.0, 9.0, 0.0, 0.6, set()),
+        (ABOVE_TOP_M - 1.0, 9.0, 0.0, 3.0, set()),
     ],
 )
 def test_a_low_tree_beside_a_span_is_no_tower(
-    known, line, passing, under, beside, turned, expected
+    known, line, passing, under, beside, turned, width, expected
 ):
-    assert dropped(known, line, tree(passing, under, beside, turned)) == expected
+    found = tree(passing, under, beside, turned, width)
+    assert dropped(known, line, found) == expected
 
 
 @pytest.mark.parametrize(

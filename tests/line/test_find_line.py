@@ -154,6 +154,48 @@ def test_a_slack_cable_at_a_tower_is_no_conductor(poles):
     assert errors(line, poles)[:, 0].max() < 0.05
 
 
+@pytest.mark.parametrize(("below", "kind"), [(8.0, "cable"), (1.0, "conductor")])
+def test_a_short_wire_below_the_conductors_of_its_tower_is_a_cable(poles, below, kind):
+    """It is too short to show that it is slack."""
+    tower = poles.towers[2]
+    held = [c.catenary.start[2] for c in poles.inner if c.from_tower == tower.id]
+    start = np.array([tower.x, tower.y, min(held) - below])
+    way = poles.inner[6].catenary.direction[::-1] * (-1, 1)
+    points = points_on(
+        Catenary.of(start, start + np.append(28.0 * way, 0.0), 600.0), 0.3, np.random.default_rng(1)
+    )
+    xyz = np.concatenate([poles.xyz, points])
+    line = find_line(WirePoints(xyz, np.ones(len(xyz), bool)), poles.towers, poles.to_its_ends)
+    [found] = [
+        wire for wire in line.conductors
+        if {wire.from_tower, wire.to_tower} == {0, tower.id}
+    ]  # fmt: skip
+    assert found.kind == kind
+
+
+def test_a_jib_that_points_out_of_the_survey_is_no_span(poles):
+    """A tower has conductors in a second direction, or leads to another tower."""
+    x, y, base = poles.towers[0].x + 200.0, poles.towers[0].y + 200.0, poles.towers[0].base
+    start = np.array([x + 1.0, y, base + 25.0])
+    chords = [
+        points_on(
+            Catenary.of(start + np.array([0, t, z]), start + np.array([30.0, t, z]), 3000.0), 0.3,
+            np.random.default_rng(1),
+        )
+        for t, z in ((-0.8, 0.0), (0.8, 0.0), (0.0, 1.3))
+    ]  # fmt: skip
+    xyz = np.concatenate([poles.xyz, *chords])
+    points = WirePoints(xyz, np.ones(len(xyz), bool))
+
+    def held(*bearings: float) -> int:
+        crane = LineTower(99, x, y, base, 28.0, 1.7, bearings)
+        line = find_line(points, [*poles.towers, crane], poles.to_its_ends)
+        return sum(99 in (wire.from_tower, wire.to_tower) for wire in line.conductors)
+
+    assert held(90.0) == 0
+    assert held(90.0, 270.0) == 3
+
+
 def test_points_that_are_not_certain_help_beside_those_that_are(poles):
     certain = np.ones(len(poles.xyz), bool)
     certain[np.hypot(*poles.inner[0].catenary.residuals(poles.xyz)) < 0.2] = False

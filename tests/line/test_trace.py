@@ -79,6 +79,22 @@ def test_a_bundle_over_a_crown_is_found_from_end_to_end(seed):
     assert min(wire.fit.catenary.length for wire in wires) > 185
 
 
+def test_a_bundle_that_crowns_hide_in_parts_is_one_wire():
+    """The pieces of one side of a bundle are followed first, and miss the rest of it."""
+    rng = np.random.default_rng(2)
+    sides = [points_on(catenary(5.0 + t, 25.0), 1.0, rng) for t in (-0.2, 0.2)]
+    points, side = np.concatenate(sides), np.repeat([0, 1], [len(points) for points in sides])
+    seen = np.ones(len(points), bool)
+    for _ in range(8):
+        start, length = rng.uniform(20, 250), rng.uniform(4, 16)
+        hidden = (points[:, 0] > start) & (points[:, 0] < start + length)
+        of_one = rng.integers(0, 3)
+        seen &= ~(hidden & ((side == of_one) | (of_one == 2)))
+    (wire,) = trace_wires(points[seen], gap=200.0)
+    assert wire.fit.catenary.length > 270
+    assert nearest([wire], catenary(5.0, 25.0)) < 0.03
+
+
 def test_wires_that_meet_at_a_crossarm_are_two():
     rng = np.random.default_rng(0)
     # A straight line from end to end is nowhere further than 0.4 m from either.

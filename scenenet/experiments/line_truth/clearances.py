@@ -13,6 +13,7 @@ from scenenet.clearance.danger import places
 from scenenet.clearance.distance import nearest_on
 from scenenet.clearance.records import SurveyClearances
 from scenenet.clearance.settings import VEGETATION, WIRE, ClearanceSettings
+from scenenet.clearance.touching import OWN, on_wires
 from scenenet.experiments.line_truth.conductors import percentiles, true_one
 from scenenet.line.records import SurveyLine
 from scenenet.pointcloud.cloud import PointCloud
@@ -76,7 +77,7 @@ def compare(
     """
     limits = settings.applied()
     assert limits is not None, "danger places need a voltage"
-    plants = _standing(corridor, cloud)
+    plants = _standing(corridor, cloud, line)
     plan, space = cKDTree(plants[:, :2]), cKDTree(plants)
     hanging = [c for c in corridor.conductors if c.from_tower and c.to_tower]
     apart, errors, unseen = _vegetation(hanging, plants, plan, line, found, settings.reach)
@@ -162,13 +163,21 @@ def _shown(found: SurveyClearances, limit: float) -> np.ndarray:
     return np.array([*((place.x, place.y) for place in listed), *steps]).reshape(-1, 2)
 
 
-def _standing(corridor: Corridor, cloud: PointCloud) -> np.ndarray:
+def _standing(corridor: Corridor, cloud: PointCloud, line: SurveyLine) -> np.ndarray:
     """(n, 3) m, the points of what stands on the ground: vegetation, and the few masts, cranes and
-    houses of the scene, which count as vegetation where no class says what they are."""
+    houses of the scene, which count as vegetation where no class says what they are.
+
+    Cables of other lines have the class of tall things too. Those that were found are none.
+    """
     settings = corridor.settings
-    xyz = cloud.xyz[np.isin(cloud.classification, STANDING)]
+    xyz, codes = cloud.xyz, cloud.classification
+    standing = np.isin(codes, STANDING)
     x, y = xyz[:, 0] - settings.easting, xyz[:, 1] - settings.northing
-    return xyz[xyz[:, 2] - corridor.terrain.height(x, y) > ABOVE_GROUND_M]
+    standing &= xyz[:, 2] - corridor.terrain.height(x, y) > ABOVE_GROUND_M
+    tall = np.flatnonzero(standing & (codes == TALL))
+    cables = [wire for wire in line.conductors if wire.kind == "cable"]
+    standing[tall[on_wires(xyz[tall], cables) == OWN]] = False
+    return xyz[standing]
 
 
 def _beside(true: TrueConductor, plan: cKDTree, reach: float) -> np.ndarray:

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fixtures.true_line import true_line
+from fixtures.true_line import true_line, wire_of
 
 from scenenet.clearance.find_clearances import find_clearances
 from scenenet.clearance.section import SectionPoints
 from scenenet.clearance.settings import ClearanceSettings
 from scenenet.experiments.line_truth.clearances import STANDING, compare, table
+from scenenet.line.records import SurveyLine
 from scenenet.pointcloud import PointCloud
-from scenenet.synthetic.codes import TOWER
+from scenenet.synthetic.codes import TALL, TOWER
 from scenenet.synthetic.corridor import Corridor
 from scenenet.synthetic.settings import SyntheticSettings
 
@@ -77,6 +78,24 @@ def test_a_cable_that_keeps_its_own_limit_is_not_missed(survey):
     listed = replace(clearances, places=tuple(cables), profile=())
     found = compare("lattice_pole", corridor, cloud, line, listed, LIMITS)
     assert found.places > 0 and (found.missed, found.false) == (0, 0)
+
+
+def test_points_of_a_cable_that_was_found_are_no_plants(survey):
+    corridor, cloud, line, clearances = survey
+    first = line.conductors[len(line.conductors) // 2]
+    (x, y, z), (far_x, far_y, far_z) = first.catenary.start, first.catenary.end
+    curve = replace(first.catenary, start=(x, y, z + 3.0), end=(far_x, far_y, far_z + 3.0))
+    cable = wire_of(curve, 99, 1, "cable")
+    points = curve.at_shares(np.linspace(0.4, 0.6, 30))
+    xyz = np.concatenate([cloud.xyz, points])
+    more = PointCloud(xyz, np.append(cloud.classification, np.full(30, TALL, np.uint8)))
+    known = replace(line, conductors=(*line.conductors, cable))
+
+    def near(cloud: PointCloud, line: SurveyLine) -> int:
+        return compare("lattice_pole", corridor, cloud, line, clearances, LIMITS).danger_points
+
+    assert near(more, line) == near(cloud, line) + 30
+    assert near(more, known) == near(cloud, line)
 
 
 def test_what_is_found_and_not_there_is_false(survey):

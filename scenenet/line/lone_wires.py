@@ -11,6 +11,7 @@ import numpy as np
 
 from scenenet.line.catenary import Catenary
 from scenenet.line.frame import SpanFrame
+from scenenet.line.trace import GAP_M as LONG_GAP_M
 from scenenet.line.trace import TAUTEST_M
 from scenenet.line.traced_spans import REACH_M, LineTower, SpanWire, TracedSpan, traced
 from scenenet.line.wire_points import WirePoints
@@ -31,6 +32,9 @@ the axis of the tower."""
 
 LINKED_M, GAP_M = 8.0, 40.0
 """m, gap in a wire that is bridged before it is known where it leads, and after."""
+
+HIDDEN = 0.7
+"""Share of a wire that may be hidden where another one passes along it, as between two towers."""
 
 PARALLEL = 12.0
 """Degrees, up to which two stretches of wires that leave a tower are one span: over 20 m, wires
@@ -57,17 +61,44 @@ def lone_spans(
             continue
         rows = points.beside(frame, REACH_M, beyond=PAST_M)
         rows = rows[free[rows] & points.certain[rows]]
-        wires = [
-            wire
-            for wire in traced(points, rows, frame)
-            if wire.catenary.length >= MIN_HELD_M and wire.rmse <= WORST_ALONE_M and is_wire(wire)
-        ]
+        wires = _wires(points, rows, frame)
         for wire in wires:
             left[wire.rows] = free[wire.rows] = False
         # What is near the axis and on no wire is looked at once.
         near = points.beside(frame, LOOKED_AT_M)
         left[near] = False
         found += spans_by_towers(wires, towers)
+
+
+def _wires(points: WirePoints, rows: np.ndarray, frame: SpanFrame) -> list[SpanWire]:
+    """The wires of a stretch.
+
+    Where one of them is seen well the span is known to go on, so that another one, such as an earth
+    wire of few points, may be hidden over as much of it as between two towers.
+    """
+    seen = [wire for wire in traced(points, rows, frame) if _is_good(wire) and is_wire(wire)]
+    longest = max((wire.catenary.length for wire in seen), default=0.0)
+    if all(wire.catenary.length > longest - LONG_GAP_M for wire in seen):
+        return seen
+    again = [
+        wire
+        for wire in traced(points, rows, frame, gap=max(LONG_GAP_M, HIDDEN * longest))
+        if _is_good(wire) and (is_wire(wire) or any(_passes_along(by, wire) for by in seen))
+    ]
+    return max(seen, again, key=lambda wires: sum(wire.catenary.length for wire in wires))
+
+
+def _is_good(wire: SpanWire) -> bool:
+    """Whether a wire is long and near enough to its points."""
+    return wire.catenary.length >= MIN_HELD_M and wire.rmse <= WORST_ALONE_M
+
+
+def _passes_along(wire: SpanWire, other: SpanWire) -> bool:
+    """Whether a wire passes along all of another one, which hangs as wires do."""
+    curve = other.catenary
+    s, _ = wire.catenary.along(np.array([curve.start, curve.end]))
+    within = s.min() >= -PAST_M and s.max() <= wire.catenary.length + PAST_M
+    return bool(within) and curve.parameter <= TAUTEST_M
 
 
 def is_wire(wire: SpanWire) -> bool:

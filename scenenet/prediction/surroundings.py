@@ -79,6 +79,7 @@ class SurveySurroundings:
             self._above[x, y].append(code)
         self._read, self._kept = read, kept
         self._tiles: OrderedDict[int, _Positions] = OrderedDict()
+        self._in_memory = 0
         self._lock = Lock()
 
     def __call__(self, place: np.ndarray, radius: float) -> np.ndarray:
@@ -97,11 +98,9 @@ class SurveySurroundings:
         with self._lock:
             if code not in self._tiles:
                 self._tiles[code] = _Positions.of(self._read(code))
-                while (
-                    len(self._tiles) > self._kept
-                    and sum(len(tile) for tile in self._tiles.values()) > KEPT_IN_ALL
-                ):
-                    self._tiles.popitem(last=False)
+                self._in_memory += len(self._tiles[code])
+                while len(self._tiles) > self._kept and self._in_memory > KEPT_IN_ALL:
+                    self._in_memory -= len(self._tiles.popitem(last=False)[1])
             self._tiles.move_to_end(code)
             return self._tiles[code]
 

@@ -1,13 +1,16 @@
 """The files that a tile index names: VPC, STAC item collection or GeoPackage.
 
 A virtual point cloud (``.vpc``, of PDAL and QGIS) is a STAC item collection: JSON with an item for
-each tile, whose asset is the file. A GeoPackage has a row for each tile, and the file in a column,
-as ``pdal tindex`` writes it.
+each tile, whose asset is the file. In a ``.vpz`` it is in a ZIP archive. A GeoPackage has a row for
+each tile, and the file in a column, as ``pdal tindex`` writes it.
 """
 
 from __future__ import annotations
 
+import json
 import re
+import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -20,8 +23,9 @@ from scenenet.core.files import read_json
 
 SUFFIXES = frozenset({".las", ".laz"})
 """Endings of the files that belong to a survey of tiles; COPC files end in ``.copc.laz``."""
-ITEM_SUFFIXES = frozenset({".vpc", ".json", ".geojson"})
-INDEX_SUFFIXES = ITEM_SUFFIXES | {".gpkg"}
+ARCHIVE_SUFFIX, MEMBER_SUFFIX = ".vpz", ".vpc"
+ITEM_SUFFIXES = frozenset({MEMBER_SUFFIX, ".json", ".geojson"})
+INDEX_SUFFIXES = ITEM_SUFFIXES | {ARCHIVE_SUFFIX, ".gpkg"}
 """Endings of tile indexes."""
 COLUMNS = ("location", "path", "filename")
 """Columns of a GeoPackage that can have the files; ``pdal tindex`` writes the first one."""
@@ -30,6 +34,8 @@ REMOTE = re.compile(r"/vsi|(?!file:)[a-z][a-z0-9+.-]+:/", re.IGNORECASE)
 the colon is a drive."""
 NAMED = 5
 """Most entries that a message names one by one."""
+LARGEST_MEMBER = 1 << 28
+"""Most bytes of the index in an archive; a tile takes about 2000."""
 LONGEST_NAME, LONGEST = 200, 2000
 """Most bytes of the name of a file or folder, and of a path. File systems allow 255 and 4096, and
 results have a longer ending."""
@@ -91,7 +97,7 @@ def read_index(path: Path) -> TileIndex:
 def _items(path: Path) -> Iterator[_Entry]:
     """The items of a STAC item collection, or the only one of a STAC item."""
     try:
-        data = read_json(path)
+        data = _in_archive(path) if path.suffix.lower() == ARCHIVE_SUFFIX else read_json(path)
     except OSError as error:
         raise InputError(error.strerror or "cannot be read", file=path) from None
     except (ValueError, RecursionError) as error:
@@ -118,6 +124,29 @@ def _items(path: Path) -> Iterator[_Entry]:
         known = isinstance(name, str) and name.isprintable() and "/" not in name
         place = f"item {number}" + (f" ({name})" if known else "")
         yield _Entry(place, _point_file(item))
+
+
+def _in_archive(path: Path) -> Any:
+    """The virtual point cloud in a ZIP archive.
+
+    Raises:
+        InputError: it is no archive, is damaged, or has no virtual point cloud, or several.
+    """
+    remedy = "Write it again, or unpack it and give the .vpc"
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = [n for n in archive.namelist() if n.lower().endswith(MEMBER_SUFFIX)]
+            if len(names) != 1:
+                problem = f"the archive has {len(names)} virtual point clouds (.vpc), not one"
+                raise InputError(problem, file=path, remedy=remedy)
+            with archive.open(names[0]) as stream:
+                content = stream.read(LARGEST_MEMBER + 1)
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+        problem = f"the archive cannot be read ({error or type(error).__name__})"
+        raise InputError(problem, file=path, remedy=remedy) from None
+    if len(content) > LARGEST_MEMBER:
+        raise InputError("the tile index in the archive is too large", file=path, remedy=remedy)
+    return json.loads(content)
 
 
 def _assets(item: Any) -> dict[str, dict[str, Any]]:

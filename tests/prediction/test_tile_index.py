@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -224,3 +225,39 @@ def test_the_tiles_of_an_index_are_predicted_as_one_survey(scene, model, tmp_pat
     assert sorted(path.name for path in (tmp_path / "out" / "line").iterdir()) == [
         "east.laz", "status.csv", "west.laz",
     ]  # fmt: skip
+
+
+def zipped(path: Path, **members: str) -> Path:
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name.replace("_", "."), content)
+    return path
+
+
+def test_a_zipped_virtual_point_cloud_names_files_beside_the_archive(tiles):
+    content = collection(tiles / "all.vpc", item("./a.laz"), item("./b.las")).read_text()
+    index = zipped(tiles / "all.vpz", all_vpc=content, all_overview_copc_laz="not looked at")
+    assert read_index(index).files == (tiles / "a.laz", tiles / "b.las")
+    assert SurveyFiles.of(index).tiled
+
+
+@pytest.mark.parametrize(
+    ("members", "message"),
+    [
+        ({"readme_txt": ""}, "0 virtual point clouds"),
+        ({"a_vpc": "{}", "b_vpc": "{}"}, "2 virtual point clouds"),
+        ({"a_vpc": "{"}, "not JSON"),
+    ],
+)
+def test_an_archive_without_one_readable_index_is_refused(tmp_path, members, message):
+    with pytest.raises(InputError, match=message):
+        read_index(zipped(tmp_path / "all.vpz", **members))
+
+
+def test_a_damaged_archive_is_refused(tmp_path, tiles):
+    content = collection(tiles / "all.vpc", item("./a.laz")).read_text()
+    index = zipped(tmp_path / "all.vpz", all_vpc=content)
+    for broken in (index.read_bytes()[:60], b"", b"<html>"):
+        index.write_bytes(broken)
+        with pytest.raises(InputError, match="the archive cannot be read"):
+            read_index(index)

@@ -138,8 +138,8 @@ def command(
     """Find the towers of surveys, or another target of a model, and classify every point.
 
     A survey is a file, a folder of LAS and LAZ files, a pattern such as 'tiles/*.laz' in quotes, or
-    a tile index: a virtual point cloud (.vpc), a STAC item collection (.json) or a GeoPackage with
-    a column location. Several files are one survey with one tower list, wherever it was cut.
+    a tile index: a virtual point cloud (.vpc, .vpz), a STAC item collection (.json) or a GeoPackage
+    with a column location. Several files are one survey with one tower list, wherever it was cut.
 
     Each survey NAME gives these files in the folder --out:
 

@@ -86,10 +86,12 @@ def _scores(result: dict[str, Any], model: str, kind: str, target: str) -> list[
     if towers is None:
         points = _points(result["points"], "at or above tau", kind, target)
         return [*voxels, f"points: {points}"]
-    voxels[3:3] = [
-        row("  voxels at or above tau", result["voxel_observer"]),
-        row("  whole towers", result["voxel_towers"]),
-    ]
+    ways = {
+        "  voxels at or above tau": result["voxel_observer"],
+        "  whole towers": result["voxel_towers"],
+    }
+    # One of them is the way of the model itself, and would be a second row of the same scores.
+    voxels[3:3] = [row(name, way) for name, way in ways.items() if way != result["voxel"]]
     errors = [
         f", median {what} error {towers[name]:.2f} m"
         for what, name in (
@@ -99,13 +101,19 @@ def _scores(result: dict[str, Any], model: str, kind: str, target: str) -> list[
         )
         if towers[name] is not None
     ]
-    return [
-        *voxels,
+    lines = [
         f"towers: {towers['n_predicted']} found, {towers['n_true']} {kind}, "
         f"precision {score_text(towers['precision'])}, recall {score_text(towers['recall'])}"
         + "".join(errors),
+        *voxels,
         "points: " + _points(result["points"], "with a tower id", kind, target),
     ]
+    if kind == "labelled":
+        lines.append(
+            "labels cover what stands around a tower too, so the recall of its points is low even "
+            "where every tower is found"
+        )
+    return lines
 
 
 def _points(points: dict[str, Any], predicted: str, kind: str, target: str) -> str:

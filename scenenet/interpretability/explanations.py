@@ -18,7 +18,9 @@ from scenenet.pointcloud.units import METRE
 NEGLIGIBLE = 0.01
 """Absolute share of a GENEO below which the explanation does not state its side."""
 
-UNDETERMINED = "no meaning: the training crops do not determine it"
+UNDETERMINED = (
+    "not determined: other values fit the training crops as well, so do not read it as a size"
+)
 """What stands in place of the meaning of a number that could as well have another value."""
 
 

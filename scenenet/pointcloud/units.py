@@ -25,10 +25,9 @@ KNOWN = {METRE: 1.0, "foot": 0.3048, "US survey foot": 1200 / 3937}
 """Unit of length -> its size in m."""
 SYMBOLS = {METRE: "m", "foot": "ft", "US survey foot": "US survey ft"}
 """Unit -> what follows a number; others have their name."""
-REPROJECT = (
-    "Reproject it to a system with metres on all axes first "
-    "(pdal translate --filter filters.reprojection)"
-)
+CONVERT = "(pdal translate IN.laz OUT.laz reprojection --filters.reprojection.out_srs=EPSG:CODE)"
+"""The command that converts a survey."""
+REPROJECT = f"Reproject it to a system with metres on all axes first {CONVERT}"
 
 
 class NotMetres(NamedTuple):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenenet.core.errors import InputError
 from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
+from scenenet.pointcloud.units import CONVERT
 from scenenet.prediction.file_status import LeftOut
 from scenenet.prediction.tile_index import INDEX_SUFFIXES, SUFFIXES, read_index
 from scenenet.prediction.work.survey_system import SurveySystem
@@ -146,18 +147,30 @@ def look_at(survey: SurveyFiles) -> tuple[dict[Path, SurveyInfo], dict[Path, Inp
         if path in errors:
             continue
         try:
-            info = survey_of_lengths(path, survey.crs)
-            ours, theirs = (SurveySystem.of(i) for i in (next(iter(headers.values()), info), info))
-            if not theirs.is_same(ours):
-                raise in_other_system(path, theirs, ours)
-            headers[path] = info
+            headers[path] = survey_of_lengths(path, survey.crs)
         except InputError as error:
             if not survey.tiled:
                 raise
             errors[path] = error
+    systems = {path: SurveySystem.of(info) for path, info in headers.items()}
+    ours = system_of_survey((systems[path], info.n_points) for path, info in headers.items())
+    for path, theirs in systems.items():
+        if ours is not None and not theirs.is_same(ours):
+            errors[path] = in_other_system(path, theirs, ours, headers.pop(path).n_points)
     if not headers:
         raise nothing_to_use(survey, list(errors.values()))
     return headers, errors
+
+
+def system_of_survey(files: Iterable[tuple[SurveySystem, int]]) -> SurveySystem | None:
+    """The coordinates of a survey: those of the first of its files that has points.
+
+    Args:
+        files: coordinates and number of points of each file that can be read. Programs write no
+            system into a file that they find no points for, so these count only without others.
+    """
+    known = list(files)
+    return next((system for system, n in known if n), known[0][0] if known else None)
 
 
 def nothing_to_use(survey: SurveyFiles, errors: Sequence[InputError]) -> InputError:
@@ -169,10 +182,18 @@ def nothing_to_use(survey: SurveyFiles, errors: Sequence[InputError]) -> InputEr
     )
 
 
-def in_other_system(path: Path, theirs: SurveySystem, ours: SurveySystem) -> LeftOut:
+def in_other_system(path: Path, theirs: SurveySystem, ours: SurveySystem, n_points: int) -> LeftOut:
     """The error of a file with other coordinates than those of the survey."""
+    if not n_points:  # programs write no system into a file that they find nothing for
+        return LeftOut("it has no points", file=path)
+    remedy = f"Predict it by itself, or convert it first {CONVERT}"
+    if theirs.crs is None:
+        remedy = (
+            "If its coordinates are those of the other files, name the system of the survey with "
+            f"--crs, such as --crs EPSG:32629. Otherwise convert it first {CONVERT}"
+        )
     return LeftOut(
         f"the file has {theirs.name}, and the files before it have {ours.name}",
         file=path,
-        remedy="Predict it by itself, or convert it first (pdal translate -f reprojection)",
+        remedy=remedy,
     )

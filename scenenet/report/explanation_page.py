@@ -98,12 +98,13 @@ def explain_survey(
         ("tau", write(card.tau, "score")),
         ("voxel size [m]", write(prediction.voxel_size, "metres")),
     ]
-    blocks = [Facts(facts), *_parameters(meanings(prediction.model, card))]
-    sections = [Section("survey", survey.given.name, blocks)]
+    sections = [Section("survey", survey.given.name, [Facts(facts)])]
     with scratch_folder() as scratch:
         for explanation, (xyz, views) in zip(explained, surroundings, strict=True):
             picture = scratch / f"{explanation.id}.png"
             sections.append(_section(explanation, xyz, views, picture))
+        numbers = _parameters(meanings(prediction.model, card))
+        sections.append(Section("model", f"The model {card.name}", numbers))
         title = f"Why these are towers: {survey.given.name}"
         write_text(out, render(sections, title, GENERATOR, made_by=_origin(card)))
     return explained
@@ -138,7 +139,8 @@ def _parameters(rows: list[tuple[str, float, str, str]]) -> list[Block]:
         Column("unit", "unit"),
         Column("meaning", "meaning"),
     ]
-    return [table(frame, columns, "The parameters that decide, and their meaning.")]
+    caption = f"The {len(rows)} parameters that decide, and their meaning."
+    return [table(frame, columns, caption, folded=True)]
 
 
 def _section(

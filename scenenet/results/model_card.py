@@ -131,12 +131,22 @@ def _columns(scores: Scores) -> list[tuple[str, str]]:
 
 
 def _numbers(facts: dict[str, Any]) -> Iterable[list[str]]:
+    evidence = facts.get("evidence", {})
+
+    def meaning(label: str, text: str) -> str:
+        if label in evidence and not evidence[label]["determined"]:
+            return f"nominally the {text}; not determined by the training crops"
+        return text
+
     for geneo in facts["geneos"]:
         for parameter, known in geneo["parameters"].items():
-            name = f"`{geneo['name']}.{parameter}`"
-            yield [name, f"{known['value']:.3g}", known["unit"], known["meaning"]]
+            label = f"{geneo['name']}.{parameter}"
+            text = meaning(label, known["meaning"])
+            yield [f"`{label}`", f"{known['value']:.3g}", known["unit"], text]
     for name, weight in facts["mixing_weights"].items():
-        yield [f"`lambda.{name}`", f"{weight:.3g}", "1", f"weight of the {name.replace('_', ' ')}"]
+        label = f"lambda.{name}"
+        text = meaning(label, f"weight of the {name.replace('_', ' ')}")
+        yield [f"`{label}`", f"{weight:.3g}", "1", text]
 
 
 def _row(cells: Sequence[str]) -> str:

@@ -137,7 +137,9 @@ def _list_in(given: Path) -> Path:
         raise InputError(f"there is no tower list (*{ENDING}) in it", file=given, remedy=remedy)
     names = ", ".join(path.name for path in found)
     raise InputError(
-        f"it has {len(found)} tower lists ({names})", file=given, remedy="Name one of them"
+        f"it has {len(found)} tower lists ({names})",
+        file=given,
+        remedy=f"Name one of them, such as {found[0]}",
     )
 
 

@@ -190,6 +190,7 @@ def test_explain_writes_a_page_that_needs_no_other_file(survey, model, tmp_path)
     assert done.returncode == 0, done.stderr
     text = page.read_text()
     assert "reach of the tower" in text
+    assert text.index('id="tower-') < text.index('id="model"') < text.index("<details")
     assert not re.search(r"""(src|href|url)\s*[=(]\s*["']?(https?:)?//""", text)
     assert text.count("data:image/png") == len(json.loads(done.stdout))
     footer = text[text.index("<footer>") : text.index("</footer>")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -65,6 +66,14 @@ def shares(predicted: np.ndarray, true: np.ndarray) -> dict[str, float | int]:
         "n_predicted": int(predicted.sum()),
         "n_points": len(true),
     }
+
+
+def test_the_towers_come_first_and_no_row_of_voxels_is_there_twice(line, call):
+    rows = call("evaluate", line.survey, "--model", line.model, "--codes", "edp").out.splitlines()
+    assert rows[0].startswith("towers: ")
+    voxels = [tuple(re.findall(r"-|\d\.\d{3}", row)) for row in rows[2:-3]]
+    assert len(voxels) == len(set(voxels)) == 4, rows
+    assert rows[-1].startswith("labels cover what stands around a tower too")
 
 
 def test_points_are_those_of_the_survey_that_predict_writes(line, scored, call, tmp_path):

@@ -17,7 +17,7 @@ from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud import PointCloud, write_las
 from scenenet.prediction.result_files import PredictionFiles
 from scenenet.prediction.settings import PredictSettings
-from scenenet.prediction.survey_files import SurveyFiles
+from scenenet.prediction.survey_files import SurveyFiles, look_at
 from scenenet.prediction.writers import predict_to_files
 
 LONE_POLES = DetectionSettings(min_conductor=0)
@@ -190,6 +190,25 @@ def test_a_file_in_another_system_is_left_out(uncut, model, tmp_path):
     record = json.loads(files.summary.read_text())["files"][-1]
     assert record["status"] == "left out"
     assert "WGS 84 / UTM zone 30N" in record["error"] and "zone 29N" in record["error"]
+
+
+@pytest.mark.parametrize("name", ["tile-00.laz", "tile-99.laz"])
+def test_a_file_without_points_and_system_is_named_as_empty(uncut, model, tmp_path, name):
+    tiles = cut(uncut, tmp_path / "tiles", random_parts(uncut, 2))
+    write_las(tiles / name, PointCloud(np.empty((0, 3)), np.empty(0, np.uint8)))
+    files = predict(tiles, model, tmp_path / "out")
+    record = {file["file"]: file for file in json.loads(files.summary.read_text())["files"]}
+    assert record.pop(name)["error"].endswith(f"{name}: it has no points")
+    assert {file["status"] for file in record.values()} == {"predicted"}
+
+
+def test_a_file_without_a_system_is_left_out_with_the_option_that_names_it(uncut, tmp_path):
+    tiles = cut(uncut, tmp_path / "tiles", random_parts(uncut, 2))
+    points = PointCloud(np.ones((5, 3)), np.zeros(5, np.uint8))
+    write_las(tiles / "z.laz", points)
+    _, errors = look_at(SurveyFiles.of(tiles))
+    assert "the file has no CRS" in str(errors[tiles / "z.laz"])
+    assert "name the system of the survey with --crs" in str(errors[tiles / "z.laz"])
 
 
 def test_a_survey_with_no_good_file_is_an_error(model, tmp_path):

@@ -24,6 +24,14 @@ def test_the_card_has_the_data_and_the_scores_of_the_best_seed(results: Results,
     text = card.read_text(encoding="utf-8")
     assert sha256(model) in text
     assert "SCENE-Net, 11 parameters" in text
+    evidence = json.loads(model.read_text())["evidence"]
+    open_, known = (
+        next(name for name, facts in evidence.items() if facts["determined"] is determined)
+        for determined in (False, True)
+    )
+    rows = {line.split("`")[1]: line for line in text.splitlines() if line.startswith("| `")}
+    assert "nominally the " in rows[open_] and "not determined by the" in rows[open_]
+    assert "determined" not in rows[known]
     best = results.champion("scenenet")
     assert f"seed {best.seed} of 2" in text
     for against, scores in (("labels", best.evaluation), ("truth", best.evaluation.truth)):

@@ -195,6 +195,7 @@ def test_what_is_no_tower_list_is_named(call, found, tmp_path):
         (tmp_path / f"{name}.towers.csv").write_text("id,x,y\n")
     done = call("register", tmp_path, "--assets", assets)
     assert done.code == 1 and "2 tower lists (a.towers.csv, b.towers.csv)" in done.err
+    assert f"such as {tmp_path / 'a.towers.csv'}" in done.err
 
 
 def test_only_its_own_results_are_replaced(call, found, register, tmp_path):

@@ -34,7 +34,7 @@ if packaged.kind == "scenenet" and packaged.protocol == "operational":
                 results=results_of(models=[packaged], predicts=packaged.name),
             ),
         message:
-            "Writing the model that comes with the package, and its card"
+            "Writing the chosen model and its card ({output.card})"
         script:
             "../scripts/packaged_model.py"
 
@@ -70,6 +70,6 @@ if WIRES:
                 results=results_of(models=[], observers=WIRES[:1]),
             ),
         message:
-            "Writing the model of wires that comes with the package, and its card"
+            "Writing the observer of wires and its card ({output.card})"
         script:
             "../scripts/packaged_wires.py"

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from scenenet.prediction.file_status import SurveyFile, readable
-from scenenet.prediction.survey_files import SurveyFiles, in_other_system, nothing_to_use
+from scenenet.prediction.survey_files import (
+    SurveyFiles,
+    in_other_system,
+    nothing_to_use,
+    system_of_survey,
+)
 from scenenet.prediction.work.lattice import Lattice
 from scenenet.prediction.work.tiling import Layer, TileSpool
 from scenenet.prediction.work.work_file import SurveySystem, WorkFile
@@ -43,7 +48,9 @@ class SurveyWork:
             InputError: no file can be used, or, of a survey that is one file, that one.
         """
         works = {path: WorkFile.open(out) for path, out in reads.items()}
-        system = next((work.system for work in works.values() if work.system is not None), None)
+        system = system_of_survey(
+            (work.system, work.file.n_points) for work in works.values() if work.system is not None
+        )
         names = survey.names
         files = tuple(
             _of_survey(works[path], system)
@@ -78,5 +85,5 @@ def _of_survey(work: WorkFile, system: SurveySystem | None) -> SurveyFile:
     """The file, left out if its coordinates are others than those of the survey."""
     if work.system is None or system is None or work.system.is_same(system):
         return work.file
-    error = in_other_system(work.file.path, work.system, system)
+    error = in_other_system(work.file.path, work.system, system, work.file.n_points)
     return SurveyFile(work.file.path, work.file.name, error=error)

@@ -193,13 +193,18 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of what separates them": printed("domain_gap", "crops.txt", 1),
         "figures of synthetic lines": of_files("lines", "seed of the line", TRUTH),
         "figures of recordings": of_files("recordings", "recording", ""),
+        "figures of streets": of_files("streets", "recording", ""),
         "figures of conductors of recordings": Table(
             ("wires",), partial(points_table, values, "wires", "recording")
+        ),
+        "figures of conductors of recordings with the line": Table(
+            ("wires_and_line",), partial(points_table, values, "wires_and_line", "recording")
         ),
         "figures of observers of conductors": printed("observers", "observers.txt", 0),
         "figures of wires in surveys": printed("wires_in_surveys", "surveys.txt", 0),
         "figures of wires without other lines": printed("wires_in_surveys", "alone.txt", 0),
         "figures of wires at towers": printed("wires_at_towers", "wires_at_towers.txt", 0),
+        "figures of wires at towers with the line": printed("wires_at_towers", "with_line.txt", 0),
         "figures of conductors of known lines": printed("line_truth", "line.txt", 0),
         "figures of clearances of known lines": printed("line_truth", "line.txt", 1),
         "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),

@@ -7,6 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import typer
+
 from scenenet.cli.inputs import Failures
 from scenenet.cli.labelled_files import read_labelled, require_crops
 from scenenet.core.errors import InputError
@@ -17,7 +19,9 @@ from scenenet.evaluation.result import Evaluation, PointScores, TowerScores
 from scenenet.evaluation.scoring import score
 from scenenet.evaluation.surveys import SurveyScores, score_survey
 from scenenet.models.model_file import ModelCard, read_model
-from scenenet.pointcloud.targets import Target
+from scenenet.models.packaged import packaged_model
+from scenenet.pointcloud.targets import WIRE, Target
+from scenenet.prediction.used_models import ModelPaths
 
 
 def evaluate_files(
@@ -29,6 +33,8 @@ def evaluate_files(
     failures: Failures,
     truths: Sequence[Path] = (),
     target: Target | None = None,
+    *,
+    line: bool = False,
 ) -> dict[str, Any]:
     """Scores of a model on labelled files, against their labels and against the truth.
 
@@ -42,6 +48,8 @@ def evaluate_files(
         truths: as in ``read_labelled``.
         target: what is scored, if its class codes are other ones in these files than in those that
             the model was trained on; None for the target of the model.
+        line: whether towers and lines are looked for too, with the model of towers of the package;
+            points of conductors then count as wires.
 
     Returns:
         the evaluation as plain values, with ``skipped`` and ``warnings``.
@@ -50,9 +58,15 @@ def evaluate_files(
         InputError: the model cannot be used, it does not find ``target``, or no file has a crop or
             survey to score.
         typer.Exit: no file could be read.
+        typer.BadParameter: ``line`` for a model that finds no wires.
     """
     trained, card = read_model(model)
     target = _scored(card, codes, target, model)
+    if line and target.name != WIRE:
+        raise typer.BadParameter(
+            f"needs a model of {WIRE}; {model} finds {target.name}", param_hint="--line"
+        )
+    models: ModelPaths = [packaged_model(), model] if line else model
     whole_surveys = grid is None
     grid = grid or VoxelSettings(fit="metric", voxel_size=card.voxel_size)
     with scratch_folder() as scratch:
@@ -72,7 +86,7 @@ def evaluate_files(
     grids = {sample.id: sample.grid for sample in files.dataset.samples}
     for survey in files.surveys:
         with failures.collect():
-            found += score_survey(survey, model, detection, grids)
+            found += score_survey(survey, models, detection, grids)
     scored = files.dataset.only(found.by_crop)
     result = score(trained, card, scored, lambda sample: found.by_crop[sample.id])
     result = _of_whole_files(result, found, towers=whole_surveys)

@@ -23,6 +23,7 @@ from scenenet.pointcloud import PointCloud, iter_chunks
 from scenenet.pointcloud.targets import Target
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
+from scenenet.prediction.used_models import ModelPaths
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ class SurveyScores:
 
 def score_survey(
     survey: LabelledSurvey,
-    model: str | Path,
+    models: ModelPaths,
     detection: DetectionSettings,
     grids: Mapping[str, VoxelGrid],
 ) -> SurveyScores:
@@ -89,7 +90,8 @@ def score_survey(
     Memory is bounded by a chunk of points and a tile of voxels.
 
     Args:
-        model: model file with tau.
+        models: model file with tau, of the target of the survey. With models of other targets it
+            is what they find together: with one of towers, points of conductors are wires too.
         grids: of the voxels of each crop, by its id.
 
     Raises:
@@ -100,19 +102,19 @@ def score_survey(
     crops = [_CropTally(crop, survey.is_sample, grids[crop.id], target) for crop in survey.crops]
     true_places = None if survey.true_towers is None else TowerPlaces(survey.true_towers)
     settings = PredictSettings()
-    with predict_survey(survey.path, model, settings, detection) as prediction:
+    with predict_survey(survey.path, models, settings, detection) as prediction:
         files = (*prediction.states, *(() if survey.truth is None else (survey.truth,)))
         with unchanged(*files), in_file(survey.path):
             chunks = iter_chunks(survey.path, survey.codes, settings.chunk_points, survey.truth)
             for chunk in track(chunks, f"{survey.path.name}: points scored"):
-                taken = prediction.taken(chunk.xyz)
+                taken = prediction.taken(chunk.xyz, target.name)
                 counts += PointCounts.of(chunk, taken, target)
                 for crop in crops:
                     crop.add(chunk, taken)
                 places.add(chunk)
                 if true_places is not None and (true := chunk.with_truth) is not None:
                     true_places.add(true)
-        found = places_of(prediction.towers)
+        found = places_of(prediction.towers if target.is_tower else ())
     return SurveyScores(
         counts,
         {tally.crop.id: tally.answer(found) for tally in crops},

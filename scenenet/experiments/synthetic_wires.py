@@ -11,6 +11,7 @@ import numpy as np
 from scenenet.detection.settings import DetectionSettings
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.models.model_file import read_model
+from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.reading import read
 from scenenet.prediction.predict import predict_survey
 from scenenet.prediction.settings import PredictSettings
@@ -26,7 +27,8 @@ class FoundWires:
     Attributes:
         xyz: (N, 3) m, positions.
         true: (N,) bool, which are wires in truth.
-        taken: (N,) bool for each model, which it takes for wires.
+        taken: (N,) bool for each model, which it takes for wires; with the line, for each model
+            twice, without it and with it.
     """
 
     xyz: np.ndarray
@@ -34,12 +36,16 @@ class FoundWires:
     taken: tuple[np.ndarray, ...]
 
 
-def look(settings: SyntheticSettings, models: Sequence[Path], folder: Path) -> FoundWires:
-    """Make a survey, and find its wires with each model: points in voxels that reach its tau. No
-    rule for towers takes part. The files of the survey are deleted afterwards.
+def look(
+    settings: SyntheticSettings, models: Sequence[Path], folder: Path, *, line: bool = False
+) -> FoundWires:
+    """Make a survey, and find its wires with each model: points in voxels that reach its tau. The
+    files of the survey are deleted afterwards.
 
     Args:
         folder: for these files.
+        line: whether towers and lines are looked for too, with the model of towers of the package,
+            as ``scenenet predict --line`` does. Without, no rule for towers takes part.
 
     Raises:
         InputError: a model cannot be used.
@@ -50,9 +56,13 @@ def look(settings: SyntheticSettings, models: Sequence[Path], folder: Path) -> F
     taken = []
     for model in models:
         _, card = read_model(model)
-        with predict_survey(survey, model, PredictSettings(), DetectionSettings()) as predicted:
-            probability = np.asarray(predicted.look_up(truth.xyz).probability)
-        taken.append(probability >= card.threshold())
+        used = [packaged_model(), model] if line else model
+        with predict_survey(survey, used, PredictSettings(), DetectionSettings()) as predicted:
+            number = predicted.target_names.index(card.finds.name)
+            points = predicted.look_up(truth.xyz)
+            taken.append(points.models[number].probability >= card.threshold())
+            if line:
+                taken.append(predicted.points.taken(points, number))
     for path in (survey, true):
         path.unlink()
     return FoundWires(truth.xyz, truth.classification == CONDUCTOR, tuple(taken))

@@ -50,6 +50,16 @@ def add_kinds(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--kinds", nargs="+", choices=get_args(Kind), default=get_args(Kind))
 
 
+def add_line(parser: argparse.ArgumentParser) -> None:
+    """The option ``--line``."""
+    parser.add_argument(
+        "--line",
+        action="store_true",
+        help="look for towers and lines too, as scenenet predict --line does: points of conductors "
+        "are wires, whatever their voxels are",
+    )
+
+
 def print_table(make: Callable[[Path], Sequence[str]]) -> int:
     """Print the lines that ``make`` gives, which may use the folder that it is called with; the
     exit status."""

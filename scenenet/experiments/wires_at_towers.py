@@ -1,6 +1,6 @@
 """Points of conductors at synthetic towers that a model of wires finds, by distance from the axis.
 
-    python -m scenenet.experiments.wires_at_towers [--model WIRES] [--seed 5] [--kinds ...]
+    python -m scenenet.experiments.wires_at_towers [--model WIRES] [--seed 5] [--kinds ...] [--line]
 
 makes the surroundings of a few towers of each kind, as towers that only carry and as tension
 towers; those of pylons with bundles of one, two and four wires, and with few and with many points.
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from scenenet.experiments.synthetic_wires import every_point, look, two_digits
-from scenenet.experiments.wire_options import add_kinds, print_table, wire_parser
+from scenenet.experiments.wire_options import add_kinds, add_line, print_table, wire_parser
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.synthetic.corridor import Corridor
 from scenenet.synthetic.settings import SyntheticSettings
@@ -66,14 +66,16 @@ def cases(kinds: Sequence[str], towers: int, seed: int) -> Iterator[SyntheticSet
             seed += 1
 
 
-def look_at_towers(settings: SyntheticSettings, wires: Path, folder: Path) -> Found:
-    """Make a survey, and compare the points that the model finds with the truth.
+def look_at_towers(
+    settings: SyntheticSettings, wires: Path, folder: Path, *, line: bool = False
+) -> Found:
+    """Make a survey, and compare the points that the model finds, or the line, with the truth.
 
     Raises:
         InputError: the model cannot be used.
     """
-    points = look(settings, [wires], folder)
-    (taken,) = points.taken
+    points = look(settings, [wires], folder, line=line)
+    taken = points.taken[-1]
     axes = np.array([(tower.x, tower.y) for tower in Corridor(settings).towers])
     away = np.min([np.hypot(*(points.xyz[:, :2] - axis).T) for axis in axes], axis=0)
     near = []
@@ -105,13 +107,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; its exit status."""
     parser = wire_parser("wires_at_towers", __doc__)
     add_kinds(parser)
+    add_line(parser)
     parser.add_argument("--towers", type=int, default=3, help="of each survey (default 3)")
     parser.add_argument("--seed", type=int, default=5, help="of the first survey (default 5)")
     chosen = parser.parse_args(arguments)
 
     def make(folder: Path) -> list[str]:
         settings = cases(chosen.kinds, chosen.towers, chosen.seed)
-        return table([look_at_towers(of, chosen.model, folder) for of in settings])
+        return table(
+            [look_at_towers(of, chosen.model, folder, line=chosen.line) for of in settings]
+        )
 
     return print_table(make)
 

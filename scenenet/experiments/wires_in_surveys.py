@@ -1,6 +1,6 @@
 """Points of wires that models find in whole synthetic surveys, line by line.
 
-    python -m scenenet.experiments.wires_in_surveys [--model WIRES...] [--seed 14000] [--lines ...]
+    python -m scenenet.experiments.wires_in_surveys [--model WIRES...] [--seed 14000] [--line] ...
 
 makes the surveys of eight lines that differ in their towers, in the wires of a conductor, in the
 pulses per m2, in relief and in trees. Each has a seed of its own, counted from the first one: with
@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from scenenet.experiments.synthetic_wires import every_point, look, two_digits
-from scenenet.experiments.wire_options import print_table, wire_parser
+from scenenet.experiments.wire_options import add_line, print_table, wire_parser
 from scenenet.metrics.voxel_scores import Confusion
 from scenenet.synthetic.settings import SyntheticSettings
 
@@ -73,13 +73,21 @@ def lines_of(first_seed: int, other_lines: float = OTHER_LINES) -> dict[str, Syn
     }
 
 
-def score(name: str, settings: SyntheticSettings, models: Sequence[Path], folder: Path) -> Scored:
-    """Make the survey of a line, and compare what each model finds with the truth.
+def score(
+    name: str,
+    settings: SyntheticSettings,
+    models: Sequence[Path],
+    folder: Path,
+    *,
+    line: bool = False,
+) -> Scored:
+    """Make the survey of a line, and compare what each model finds with the truth; with the line,
+    without it and with it.
 
     Raises:
         InputError: a model cannot be used.
     """
-    wires = look(settings, models, folder)
+    wires = look(settings, models, folder, line=line)
     return Scored(name, settings, tuple(Confusion.of(each, wires.true) for each in wires.taken))
 
 
@@ -138,13 +146,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="cables of other lines, which hang in the air as wires do and count as false: the "
         f"truth has the wires of the line itself (default {OTHER_LINES:g} per km)",
     )
+    add_line(parser)
     chosen = parser.parse_args(arguments)
     made = lines_of(chosen.seed, chosen.other_lines)
     wanted = {name: of for name, of in made.items() if name in chosen.lines}
 
     def make(folder: Path) -> list[str]:
-        rows = [score(name, of, chosen.model, folder) for name, of in wanted.items()]
-        return table(rows, [model.stem for model in chosen.model])
+        rows = [score(*each, chosen.model, folder, line=chosen.line) for each in wanted.items()]
+        names = [model.stem for model in chosen.model]
+        if chosen.line:
+            names = [each for name in names for each in (name, f"{name} and line")]
+        return table(rows, names)
 
     return print_table(make)
 

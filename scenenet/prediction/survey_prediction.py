@@ -228,10 +228,10 @@ class SurveyPrediction:
         """(n,) uint32, id of the tower whose shape has each of the points (n, 3) m, 0 for none."""
         return self._owners(xyz)
 
-    def taken(self, xyz: np.ndarray) -> np.ndarray:
-        """(n,) bool, which points (n, 3) of the survey, in its units, are taken for the target of
-        the first model (``PointLookUp.taken``)."""
-        return self.points.taken(self.look_up(xyz), 0)
+    def taken(self, xyz: np.ndarray, target: str) -> np.ndarray:
+        """(n,) bool, which points (n, 3) of the survey, in its units, are taken for the target with
+        a name, one of ``target_names`` (``PointLookUp.taken``)."""
+        return self.points.taken(self.look_up(xyz), self.target_names.index(target))
 
     def look_up(self, xyz: np.ndarray) -> PointPredictions:
         """Probabilities, tower id and shares of points (n, 3) of the survey, in its units."""

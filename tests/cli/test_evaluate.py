@@ -76,6 +76,31 @@ def test_the_towers_come_first_and_no_row_of_voxels_is_there_twice(line, call):
     assert rows[-1].startswith("labels cover what stands around a tower too")
 
 
+def test_with_the_line_points_of_conductors_count_as_wires(line, call, tmp_path):
+    given = "evaluate", line.survey, "--model", "wires", *LABELLED, "--truth", line.truth
+    alone, scores = (json.loads(call(*given, *more).out) for more in ((), ("--line",)))
+    cloud = read(line.survey, "edp")
+    write_las(tmp_path / "bare.laz", PointCloud(cloud.xyz, np.zeros_like(cloud.classification)))
+    called = call("predict", tmp_path / "bare.laz", "--line", "--classify", "--codes", "edp",
+                  "--out", tmp_path / "found", "--json")  # fmt: skip
+    assert called.code == 0
+    [summary] = json.loads(called.out)
+    assert scores["points"]["n_predicted"] == summary["targets"][1]["points"]
+    classified = np.asarray(laspy.read(tmp_path / "found" / "bare.laz").classification) == 16
+    # Points of towers are of nothing else where classes are written.
+    assert (
+        0.9 * summary["targets"][1]["points"] < classified.sum() < summary["targets"][1]["points"]
+    )
+    assert scores["points"]["n_true"] == int((cloud.classification == 16).sum())
+    assert scores["truth"]["points"]["iou"] > alone["truth"]["points"]["iou"]
+
+
+def test_the_line_says_nothing_of_other_targets(line, call):
+    refused = call("evaluate", line.survey, "--model", line.model, *LABELLED, "--line")
+    assert refused.code == 2
+    assert "needs a model of wire" in refused.err
+
+
 def test_points_are_those_of_the_survey_that_predict_writes(line, scored, call, tmp_path):
     done = call("predict", line.survey, "--model", line.model, "--out", tmp_path)
     assert done.code == 0, done.err

@@ -20,6 +20,7 @@ from scenenet.clearance.settings import ClearanceSettings, SpanSag
 from scenenet.detection.settings import DetectionSettings
 from scenenet.line.notes import FOUND_AGAIN, NOTE_KINDS, PASSED, UNTRACED
 from scenenet.line.records import AS_FLOWN
+from scenenet.pointcloud import read
 from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import TowerSearch, find_in_survey
 from scenenet.prediction.predict import predict_survey
@@ -155,6 +156,24 @@ def test_each_point_of_the_wire_has_its_span_and_no_other_point_has_one(predicte
     found = np.asarray(points["conductor_id"]) > 0
     assert found[on_wire].mean() > 0.95
     assert on_wire[found].mean() > 0.95
+
+
+def test_points_of_conductors_are_wires_whatever_the_observer_says(line, model, wire_finder):
+    xyz = read(line).xyz
+    with predict_survey(line, [model, wire_finder], PredictSettings(), LONE_POLES) as whole:
+        points = whole.look_up(xyz)
+        tower, on = points.tower_id > 0, points.conductor_id > 0
+        probability = points.models[1].probability
+        tau = whole.further[0].used.card.threshold()
+        np.testing.assert_array_equal(
+            whole.taken(xyz, "wire"), (probability >= tau) | (on & ~tower)
+        )
+        np.testing.assert_array_equal(whole.taken(xyz, "tower"), tower)
+        # An observer that says nothing.
+        nothing = replace(points.models[1], probability=np.zeros_like(probability))
+        unseen = replace(points, models=(points.models[0], nothing))
+        np.testing.assert_array_equal(whole.points.taken(unseen, 1), on & ~tower)
+    assert (on & ~tower).sum() > 100
 
 
 def test_the_layers_have_the_rows_of_the_tables(predicted):

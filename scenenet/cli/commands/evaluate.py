@@ -29,6 +29,7 @@ from scenenet.cli.output import score_lines, show
 EXAMPLES = (
     "scenenet evaluate labelled.laz --model model.json --codes edp",
     "scenenet evaluate labelled.laz --model model.json --codes asprs --fit metric",
+    "scenenet evaluate labelled.laz --model wires --codes asprs --line",
     "scenenet evaluate line.laz --model model.json --codes edp --truth line.truth.laz",
 )
 
@@ -63,6 +64,14 @@ def command(
             "[default: the target of the model]",
         ),
     ] = None,
+    line: Annotated[
+        bool,
+        typer.Option(
+            "--line",
+            help="For a model of wires: find towers and conductors too, as scenenet predict --line "
+            "does. The points of conductors then count as wires, whatever their voxels are.",
+        ),
+    ] = False,
     min_conductor: MinConductor = None,
     kernels: Kernels = None,
     measurements: Measurements = None,
@@ -77,7 +86,7 @@ def command(
     The point scores compare the points to which scenenet predict gives a tower id with the points
     labelled tower: all points of each file, whatever --fit is. For a model of another target they
     compare the points in voxels at or above tau with the points labelled with the target, and there
-    are no tower scores.
+    are no tower scores. With --line the points of conductors count too.
 
     The exit code is 1 if a file fails; the other files are still scored.
     """
@@ -93,7 +102,9 @@ def command(
     grid = cube(resolution) if fit.value == "cube" else None
     detection = detection_settings(min_conductor)
     failures = Failures()
-    result = evaluate_files(labelled, model, codes.value, grid, detection, failures, truths, finds)
+    result = evaluate_files(
+        labelled, model, codes.value, grid, detection, failures, truths, finds, line=line
+    )
     for skipped in result["skipped"]:
         print(f"not scored: {skipped['sample']}: {skipped['reason']}", file=sys.stderr)
     show(result, as_json, score_lines)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenenet.line.records import SurveyLine
-from scenenet.pointcloud.targets import TOWER, Target
+from scenenet.pointcloud.targets import TOWER, WIRE, Target
 from scenenet.prediction.work.conductor_points import ConductorOwners
 from scenenet.prediction.work.lattice import Lattice, groups
 from scenenet.prediction.work.structures import Owners, Structures
@@ -120,12 +120,18 @@ class PointLookUp:
         return PointPredictions(found, self._owners(xyz, codes), *on)
 
     def taken(self, points: PointPredictions, number: int) -> np.ndarray:
-        """(n,) bool, which points are taken for the target of the model with a number: points of
-        towers, or for another target those in voxels at or above tau."""
+        """(n,) bool, which points are taken for the target of the model with a number.
+
+        For towers these are their points. For another target they are those in voxels at or above
+        tau, and for wires also those on a conductor that are of no tower: the observer misses
+        single voxels of a wire."""
         model = self.models[number]
         if model.target.is_tower:
             return points.tower_id > 0
-        return points.models[number].probability >= model.tau
+        found = points.models[number].probability >= model.tau
+        if model.target.name == WIRE and points.conductor_id is not None:
+            found |= (points.conductor_id > 0) & (points.tower_id == 0)
+        return found
 
 
 def _look_up(tiles: TilePredictions, codes: np.ndarray, voxels: np.ndarray) -> TargetPredictions:

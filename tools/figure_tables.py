@@ -207,6 +207,7 @@ def tables_of(values: Values, figures: Figures) -> dict[str, Table]:
         "figures of wires at towers with the line": printed("wires_at_towers", "with_line.txt", 0),
         "figures of conductors of known lines": printed("line_truth", "line.txt", 0),
         "figures of clearances of known lines": printed("line_truth", "line.txt", 1),
+        "figures of conductors in cuts": printed("line_truth", "cuts.txt", 0),
         "figures of observers of vegetation": printed("vegetation", "vegetation.txt", 0),
         "figures of training on synthetic crops": printed("transfer", "transfer.txt", 0),
     }

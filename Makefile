@@ -14,6 +14,8 @@ reproduce: $(INSTALLED)  ## every result: those of the tool, and the main compar
 
 demo: $(INSTALLED)  ## a survey, its tower map and a report in minutes, under results/demo/
 	$(VENV)/bin/snakemake --cores $(CORES) --configfile config/demo.yaml -- results/demo/report/index.html
+	@echo "open results/demo/predict/unseen/unseen.html: the tower map"
+	@echo "open results/demo/report/index.html: the report"
 
 model: $(INSTALLED)  ## train the models that come with the package again, and put them in
 	$(VENV)/bin/snakemake --cores $(CORES) -- results/packaged/towers.json results/packaged/wires.json

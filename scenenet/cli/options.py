@@ -115,7 +115,7 @@ ModelFile = Annotated[
         "--model",
         help=_MODEL_HELP,
         callback=named_model,
-        show_default="the model that comes with the package",
+        show_default="towers, the model of the package",
         default_factory=packaged_model,
     ),
 ]
@@ -125,7 +125,7 @@ ModelFiles = Annotated[
         "--model",
         help=f"{_MODEL_HELP} Give one for each target that you want to find.",
         callback=lambda given: [named_model(path) for path in given],
-        show_default="the model that comes with the package",
+        show_default="towers, the model of the package",
         default_factory=lambda: [packaged_model()],
     ),
 ]
@@ -136,9 +136,9 @@ MinConductor = Annotated[
     float | None,
     typer.Option(
         min=0,
-        help="Length of conductor that a tower must have, all directions together. The unit is "
-        "the stretch from 3 m to 20 m off its axis. 0 accepts towers without conductors.  "
-        "[default: 0.75]",
+        help="Conductor that a tower must have, all directions added, in units of 17 m: the "
+        "stretch from 3 m to 20 m from its axis. 0.75 is 13 m in one direction. 0 accepts towers "
+        "without conductors.  [default: 0.75]",
     ),
 ]
 System = Annotated[

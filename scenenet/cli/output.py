@@ -12,13 +12,16 @@ from scenenet.pointcloud.targets import TOWER, Target
 
 def show(data: Any, as_json: bool, lines: Callable[[Any], list[str]]) -> None:
     """Print ``data`` as JSON, or as the ``lines`` for people."""
-    print(json.dumps(data, indent=2) if as_json else "\n".join(lines(data)))
+    text = json.dumps(data, indent=2) if as_json else "\n".join(lines(data))
+    if text:  # no empty line where every input failed
+        print(text)
 
 
 def training_lines(result: dict[str, Any]) -> list[str]:
-    scores, crops = result["scores"], result["crops"]
+    scores, crops, n_seeds = result["scores"], result["crops"], len(result["seeds"])
+    chosen = "of one seed" if n_seeds == 1 else f"the best of {n_seeds} seeds"
     lines = [
-        f"{result['model']}: the best of {len(result['seeds'])} seeds (seed {result['seed']}), "
+        f"{result['model']}: {chosen} (seed {result['seed']}), "
         f"{crops['training']} crops to train on, {crops['validation']} to tune on",
         f"tau {result['tau']:.3f}, kernel {'x'.join(map(str, result['kernel_size']))}, "
         f"on the {result['tuned_on']} crops: P {score_text(scores['precision'])} "

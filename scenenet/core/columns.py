@@ -67,6 +67,11 @@ class Record:
         return cls(**data)
 
 
+def written(value: Any) -> Any:
+    """A length as tables have it, to a tenth of a millimetre; any other value as it is."""
+    return round(value, 4) if isinstance(value, float) else value
+
+
 def columns_of(kind: type) -> tuple[FieldColumn, ...]:
     """The columns that a dataclass declares with ``column``, in order."""
     types = get_type_hints(kind)

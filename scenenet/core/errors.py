@@ -38,7 +38,8 @@ class InputError(ValueError):
         self.place = place
         self.remedy = remedy
         where = "".join(f"{part}: " for part in (self.file, place) if part)
-        super().__init__(where + problem + (f". {remedy}" if remedy else ""))
+        stop = "" if problem.endswith("?") else "."
+        super().__init__(where + problem + (f"{stop} {remedy}" if remedy else ""))
 
     def to_json(self) -> dict[str, str | None]:
         """Its parts, for a file that a later stage reads."""

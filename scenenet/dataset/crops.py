@@ -303,7 +303,7 @@ def _cut(
         chunks = iter_chunks(
             path, codes, truth=None if truth is None else truth.path, fields=fields
         )
-        for chunk in track(chunks, f"{survey}: chunks read"):
+        for chunk in track(chunks, f"{path}: chunks read"):
             for number in _reaching(chunk, centres, radii):
                 append(spools[number], chunk, crops[number].inside(chunk.xyz), fields)
         for crop, centre, radius, spool in zip(crops, centres, radii, spools, strict=True):

@@ -116,7 +116,7 @@ class _Cut:
         """The squares of ``edge`` m of a survey, row by row from its lower corner."""
         corner = np.array(survey_info(path).mins[:2])
         cells, counts = set[tuple[int, int]](), np.zeros(256, np.int64)
-        for chunk in track(iter_chunks(path, self._codes), f"{self._survey}: labels read"):
+        for chunk in track(iter_chunks(path, self._codes), f"{path}: labels read"):
             counts += np.bincount(chunk.classification, minlength=256)
             own = chunk.xyz[chunk.is_labelled(self._target), :2]
             cells.update(map(tuple, np.unique(_cells(own, corner, edge), axis=0).tolist()))
@@ -126,7 +126,7 @@ class _Cut:
         numbers = {cell: number for number, cell in enumerate(sorted(cells), start=1)}
         with scratch_folder() as folder:
             chunks = iter_chunks(path, self._codes, truth=self._truth, fields=self._fields)
-            for chunk in track(chunks, f"{self._survey}: chunks read"):
+            for chunk in track(chunks, f"{path}: chunks read"):
                 for cell, rows in _grouped(_cells(chunk.xyz[:, :2], corner, edge)):
                     if cell in numbers:
                         append(folder / f"{numbers[cell]}", chunk, rows, self._fields)

@@ -93,7 +93,7 @@ def rough_towers(
     rows = np.full((len(searched), len(fields(RoughTower))), np.nan)
     # Block by block, because ``detected`` has not all in memory.
     order = np.lexsort((np.arange(len(searched)), *(searched // BLOCK_M).T))
-    for row in track_if(order, labelled(progress, "axes looked at")):
+    for row in track_if(order, labelled(progress, "places looked at")):
         axis = searched[row]
         around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
         tower = _measure(detected, axis, around, settings)

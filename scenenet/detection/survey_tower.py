@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenenet.core.columns import column, columns_of, in_units
+from scenenet.core.columns import column, columns_of, in_units, written
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 
@@ -84,8 +84,13 @@ class SurveyTower:
 
     def to_row(self) -> dict[str, Any]:
         """The tower as a row of plain values, with the columns of ``row_types``: bearings as a
-        text, a column for each GENEO."""
-        row = {c.name: c.value(self) for c in TOWER_COLUMNS if c.type is not Mapping}
+        text, a column for each GENEO. Lengths are rounded. The others are not: a review sorts
+        towers by their probability."""
+        row = {
+            c.name: written(c.value(self)) if c.unit == "m" else c.value(self)
+            for c in TOWER_COLUMNS
+            if c.type is not Mapping
+        }
         row["conductor_bearings"] = " ".join(f"{b:.1f}" for b in self.conductor_bearings)
         return row | {f"{CONTRIBUTION}{name}": share for name, share in self.contributions.items()}
 

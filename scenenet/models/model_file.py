@@ -152,6 +152,7 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
             file=path,
             remedy=f"Name a file, or a model of the package: {' or '.join(PACKAGED)}",
         )
+    _refuse_survey(path)
     try:
         if path.suffix == ".safetensors":
             return _read_cnn(path)
@@ -163,8 +164,9 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
     except ValidationError as error:
         fault = error.errors()[0]
         key = ".".join(map(str, fault["loc"]))
+        message = fault["msg"].removeprefix("Value error, ")
         raise InputError(
-            f"not a readable model file ({key} = {fault['input']!r}: {fault['msg']})",
+            f"not a readable model file ({key} = {fault['input']!r}: {message})",
             file=path,
             remedy="Correct the value, or train the model again",
         ) from None
@@ -174,6 +176,25 @@ def read_model(path: str | Path) -> tuple[VoxelModel, ModelCard]:
             file=path,
             remedy="Name a .json or .safetensors file that scenenet train wrote",
         ) from None
+
+
+def _refuse_survey(path: Path) -> None:
+    """Refuse a survey that is given as a model.
+
+    Raises:
+        InputError: it is a LAS or LAZ file.
+    """
+    try:
+        with path.open("rb") as stream:
+            is_survey = stream.read(4) == b"LASF"
+    except OSError:  # said by whoever reads the model
+        return
+    if is_survey:
+        raise InputError(
+            "this is a LAS or LAZ file, not a model",
+            file=path,
+            remedy="Name a .json or .safetensors file that scenenet train wrote",
+        )
 
 
 def is_model_file(path: str | Path) -> bool:

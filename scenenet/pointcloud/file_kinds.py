@@ -81,10 +81,18 @@ def _check_there(path: Path) -> None:
     if not path.parent.is_dir():
         remedy = f"The folder {path.parent} does not exist either: check the path"
     else:
-        names = [entry.name for entry in path.parent.iterdir() if entry.is_file()]
-        near = difflib.get_close_matches(path.name, names, n=3)
+        # By the stem: names with the same ending are alike by that alone.
+        stems: dict[str, list[str]] = {}
+        for entry in sorted(path.parent.iterdir()):
+            if entry.is_file():
+                stems.setdefault(entry.stem, []).append(entry.name)
+        near = [
+            name
+            for stem in difflib.get_close_matches(path.stem, stems, n=3)
+            for name in stems[stem]
+        ]
         if near:
-            remedy = f"Did you mean {' or '.join(near)} in the same folder"
+            remedy = f"Did you mean {' or '.join(near[:3])} in the same folder?"
     raise InputError("there is no such file", file=path, remedy=remedy)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from scenenet.core.columns import FieldColumn, in_units
+from scenenet.core.columns import FieldColumn, in_units, written
 from scenenet.prediction.tower_lists import arrays, write_layer
 
 if TYPE_CHECKING:
@@ -68,9 +68,4 @@ def write_table(
         table.writeheader()
         for row in rows:
             sized = in_units(row, sizes)
-            table.writerow({c.name: _shown(c.value(sized)) for c in columns})
-
-
-def _shown(value: Any) -> Any:
-    """Lengths to a tenth of a millimetre."""
-    return round(value, 4) if isinstance(value, float) else value
+            table.writerow({c.name: written(c.value(sized)) for c in columns})

@@ -59,16 +59,17 @@ class SurveyFiles:
             return cls(given, given.stem, files, True, index.refused, index.notes, crs)
         if given.is_dir():
             found = [path for path in given.iterdir() if _is_tile(path)]
-            name = given.resolve().name
+            name, nothing = given.resolve().name, "there is no LAS or LAZ file in it"
         elif not given.exists() and glob.has_magic(str(given)):
             matches = Path(given.anchor).glob(str(given.relative_to(given.anchor)))
             found = [path for path in matches if _is_tile(path)]
             name = next(p for p in given.parents if not glob.has_magic(str(p))).resolve().name
+            nothing = "no LAS or LAZ file matches this pattern"
         else:
             return cls(given, result_stem(given), (given,), crs=crs)
         if not found:
             raise InputError(
-                "there is no LAS or LAZ file in it",
+                nothing,
                 file=given,
                 remedy="Name a survey file, a folder of tiles, a pattern such as 'tiles/*.laz', or "
                 "a tile index",

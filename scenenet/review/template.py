@@ -7,6 +7,7 @@ import csv
 from pathlib import Path
 from typing import Any
 
+from scenenet.core.columns import written
 from scenenet.core.errors import InputError
 from scenenet.core.files import atomic
 from scenenet.line.notes import LineNote
@@ -57,7 +58,8 @@ def write_template(path: Path, found: FoundList) -> list[Doubted]:
 
 def _of_place(note: LineNote) -> dict[str, Any]:
     """A row without an id; a person who sees a tower there writes ``add``."""
-    return {**dict.fromkeys(COLUMNS), "doubts": note.of_place, "x": note.x, "y": note.y}
+    place = {"x": written(note.x), "y": written(note.y)}
+    return {**dict.fromkeys(COLUMNS), "doubts": note.of_place, **place}
 
 
 def _row(doubted: Doubted) -> dict[str, Any]:

@@ -69,7 +69,7 @@ def make_survey(
 
     stretches = corridor.stretches(workers or len(os.sched_getaffinity(0)))
     if progress is not None:
-        stretches = track(stretches, progress, total=len(corridor))
+        stretches = track(stretches, f"{progress}: stretches made", total=len(corridor))
     counts = np.zeros(256, np.int64)
     wrong = 0
     # The line starts at the origin; a file with steps of 1 mm reaches 2000 km to each side of it.

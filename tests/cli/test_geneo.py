@@ -98,6 +98,7 @@ def test_a_kernel_is_shown_with_its_values_in_words_and_in_numbers(call, tmp_pat
     assert "quarter turns about z leave it unchanged: yes" in shown
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert call(*show, "--out", picture).code == 1
+    assert "9 is the largest value and . is 0" in shown.splitlines()[-1]
     row = shown.partition("from above")[2].splitlines()[5]
     assert row.split() == row.split()[::-1]  # as from the other side
 

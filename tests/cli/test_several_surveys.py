@@ -29,6 +29,36 @@ def test_the_surveys_after_a_bad_one_are_predicted(call, three, pole_model, tmp_
     assert "bad.laz" in errors[0]
 
 
+def test_the_line_of_a_survey_says_which_files_failed_and_what_to_open(
+    call, three, pole_model, tmp_path
+):
+    good, bad, _ = three
+    tiles, out = tmp_path / "tiles", tmp_path / "out"
+    tiles.mkdir()
+    for path in (good, bad):
+        shutil.copy(path, tiles)
+    done = call("predict", tiles, good, "--model", pole_model, "--out", out)
+    assert done.code == 1
+    tiled, one = done.out.splitlines()
+    assert "1 of 2 files predicted, 1 failed" in tiled and "files predicted" not in one
+    assert f"open {out / 'tiles.html'}; of each file: {out / 'tiles' / 'status.csv'}" in tiled
+    assert one.endswith(f"open {out / 'field.html'}")
+    for path in (out / "tiles.html", out / "tiles" / "status.csv", out / "field.html"):
+        assert path.exists()
+
+
+def test_where_every_survey_fails_nothing_is_printed(call, three, pole_model, tmp_path):
+    done = call("predict", three[1], "--model", pole_model, "--out", tmp_path / "out")
+    assert done.code == 1 and done.out == ""
+    assert call("check", three[1]).out == ""
+
+
+def test_check_names_each_file_by_its_path(call, three):
+    good, _, good2 = three
+    shown = call("check", good, good2).out
+    assert [f"{path}: LAZ" in shown for path in (good, good2)] == [True, True]
+
+
 def test_a_survey_damaged_in_its_points_stops_no_other(call, three, pole_model, tmp_path):
     good, bad, _ = three
     whole = good.read_bytes()

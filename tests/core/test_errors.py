@@ -27,6 +27,10 @@ def test_the_message_has_the_parts_that_are_known(parts, message):
     assert str(InputError("it is empty", **parts)) == message
 
 
+def test_a_question_needs_no_full_stop():
+    assert str(InputError("did you mean 'b'?", remedy="Name one")) == "did you mean 'b'? Name one"
+
+
 def test_an_error_can_be_sent_between_processes():
     error = InputError("it is empty", file="a.laz", place="row 3", remedy="Fill it")
     copy = pickle.loads(pickle.dumps(error))

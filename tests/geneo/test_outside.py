@@ -130,7 +130,7 @@ def test_two_files_of_one_name_are_refused(ring, tmp_path):
 
 def test_an_unknown_name_lists_the_known_ones_with_the_closest(ring):
     KERNELS.provide([ring])
-    with pytest.raises(InputError, match=r"'rng'; did you mean 'ring'\?\. Name one of: arrow, "):
+    with pytest.raises(InputError, match=r"'rng'; did you mean 'ring'\? Name one of: arrow, "):
         kernel_named("rng")
 
 

@@ -190,6 +190,13 @@ def test_another_kind_of_file_is_refused_by_name(tmp_path, name, content):
     assert refused.value.file == str(tmp_path / name)
 
 
+def test_a_survey_in_place_of_a_model_is_named(tmp_path):
+    path = tmp_path / "line.laz"
+    path.write_bytes(b"LASF\x00\xff")
+    with pytest.raises(InputError, match="this is a LAS or LAZ file, not a model"):
+        read_model(path)
+
+
 def test_weights_without_a_card_are_refused(tmp_path):
     from safetensors.torch import save_file
 

@@ -98,6 +98,9 @@ def test_a_missing_file_is_reported_with_similar_names(make_las):
     with pytest.raises(InputError, match=r"corridor_14\.laz") as caught:
         read(path.with_name("coridor_14.laz"))
     assert "Did you mean" in caught.value.remedy
+    with pytest.raises(InputError) as caught:  # the ending alone makes no name similar
+        read(path.with_name("nix.laz"))
+    assert caught.value.remedy == "Check the path"
 
 
 @pytest.mark.parametrize(

@@ -219,6 +219,11 @@ def test_a_survey_with_no_good_file_is_an_error(model, tmp_path):
     assert not (tmp_path / "out" / "tiles.summary.json").exists()
 
 
+def test_a_pattern_without_a_match_is_no_folder(tmp_path):
+    with pytest.raises(InputError, match="no LAS or LAZ file matches this pattern"):
+        SurveyFiles.of(tmp_path / "nix*.laz")
+
+
 def test_a_later_prediction_replaces_the_files_of_an_earlier_one(uncut, model, tmp_path):
     tiles = cut(uncut, tmp_path / "tiles", random_parts(uncut, 3))
     files = predict(tiles, model, tmp_path / "out")

@@ -59,8 +59,11 @@ def test_every_difference_is_found_and_no_other(call, found, towers, register, t
     moved = next(entry for entry in result["entries"] if entry["asset"] == "A5")
     assert (moved["east_m"], moved["north_m"]) == pytest.approx((0.0, 6.0), abs=1e-6)
     assert result["shift_m"] == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert "nothing was written" not in done.out
 
     table = rows_of(tmp_path / "out" / "line.register.csv")
+    lengths = [row[name] for row in table for name in ("tower_x", "distance_m", "east_m")]
+    assert all(len(length.partition(".")[2]) <= 4 for length in lengths)
     assert [row["status"] for row in table] == [e["status"] for e in result["entries"]]
     package = tmp_path / "out" / "line.register.gpkg"
     layers = {name: pyogrio.raw.read(package, layer=name) for name in ("assets", "new", "moves")}
@@ -80,6 +83,8 @@ def test_the_summary_for_people_names_what_differs(call, found, register, tmp_pa
     assert first.startswith("13 assets, 12 towers: 7 matched, 3 moved more than 2 m, 2 missing")
     assert "moved: asset A5" in done.out and "missing: asset G1" in done.out
     assert "A2" not in done.out
+    assert "-0.00" not in done.out and "+0.00 m east" in done.out
+    assert done.out.splitlines()[-1] == "nothing was written; name a folder with --out"
 
 
 def test_longitude_and_latitude_give_the_same(call, found, register, tmp_path):

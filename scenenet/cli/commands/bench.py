@@ -29,7 +29,7 @@ def command(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Time the package against alternative implementations of the same results.
+    """Time the package against alternative implementations.
 
     The convolution, the voxelisation and the prediction of a survey are timed, in a few minutes.
     """

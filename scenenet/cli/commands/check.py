@@ -45,7 +45,7 @@ def command(
     system = coordinate_system(crs)
     scheme = None if codes is None else codes.value
     failures = Failures()
-    reports = []
+    reports, texts = [], []
     for survey in failures.look_at(surveys, _files).values():
         warn(survey.given, survey.notes)
         failures.errors += survey.refused.values()
@@ -53,10 +53,11 @@ def command(
             if path not in survey.refused:
                 with failures.collect():
                     reports.append(check_survey(path, scheme, crs=system))
+                    texts.append(reports[-1].text(path))
     if as_json:
         print(json.dumps([report.to_json() for report in reports], indent=2))
-    else:
-        print("\n\n".join(report.text() for report in reports))
+    elif texts:
+        print("\n\n".join(texts))
     failures.end()
 
 

@@ -53,7 +53,9 @@ def command(
     from scenenet.report.explanation_page import explain_survey, is_explanation
 
     if out.suffix.lower() not in (".html", ".htm"):
-        raise typer.BadParameter("an explanation is an .html file", param_hint="--out")
+        raise typer.BadParameter(
+            f"an explanation is an .html file, such as {out / 'why.html'}", param_hint="--out"
+        )
     named = SurveyFiles.of(survey, coordinate_system(crs))
     inputs = [survey, *named.files, model]
     check_outputs([Output(out, is_explanation)], inputs, overwrite=overwrite)

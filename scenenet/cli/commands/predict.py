@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -35,6 +36,9 @@ from scenenet.cli.predicted_surveys import (
 from scenenet.models.packaged import packaged_model
 from scenenet.pointcloud.class_schemes import class_scheme
 from scenenet.pointcloud.targets import Target
+
+if TYPE_CHECKING:
+    from scenenet.prediction.result_files import PredictionFiles
 
 EXAMPLES = (
     "scenenet predict line.laz --out predicted",
@@ -135,7 +139,9 @@ def command(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Find the towers of surveys, or another target of a model, and classify every point.
+    """Find the towers of surveys and classify every point.
+
+    Models of other targets (--model) find other objects.
 
     A survey is a file, a folder of LAS and LAZ files, a pattern such as 'tiles/*.laz' in quotes, or
     a tile index: a virtual point cloud (.vpc, .vpz), a STAC item collection (.json) or a GeoPackage
@@ -213,7 +219,7 @@ def command(
     detection = detection_settings(min_conductor)
     tiled = any(named[given].tiled for given in ready)
     code = code_hash([writers.__file__]) if tiled else None
-    summaries = []
+    summaries, done = [], []
     for given in ready:
         with failures.collect():
             summary = writers.predict_to_files(
@@ -223,8 +229,24 @@ def command(
             for file in summary.files:
                 if file["error"]:
                     failures.errors.append(InputError(file["error"]))
-    show(summaries, as_json, lambda all_: [_line(summary) for summary in all_])
+            done.append(given)
+    show(
+        summaries,
+        as_json,
+        lambda all_: [
+            f"{_line(summary)}{_where(results[given])}"
+            for given, summary in zip(done, all_, strict=True)
+        ],
+    )
     failures.end()
+
+
+def _where(results: PredictionFiles) -> str:
+    """What to open."""
+    status = f"; of each file: {results.status}" if results.status else ""
+    if results.page is None:
+        return f"; results in {results.summary.parent}{status}"
+    return f"; open {results.page}{status}"
 
 
 def _line(summary: dict[str, Any]) -> str:
@@ -242,4 +264,8 @@ def _line(summary: dict[str, Any]) -> str:
         if wires["to_look_at"]:
             found.append(f"{wires['to_look_at']} places to look at (layer line_notes)")
     line = f"{summary['survey']}: {', '.join(found)} among {summary['points']:,} points"
+    status = Counter(file["status"] for file in summary["files"])
+    if status.total() > status["predicted"]:
+        others = [f"{status[name]} {name}" for name in ("failed", "left out") if status[name]]
+        line += f"; {status['predicted']} of {status.total()} files predicted, {', '.join(others)}"
     return line if summary["towers"] is not None else f"{line}; towers were not looked for"

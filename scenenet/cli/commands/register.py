@@ -88,7 +88,8 @@ def command(
         )
     if files is not None:
         write_comparison(comparison, towers, files)
-    show(comparison.to_json(), as_json, _lines)
+    unwritten = ["nothing was written; name a folder with --out"] if files is None else []
+    show(comparison.to_json(), as_json, lambda result: [*_lines(result), *unwritten])
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
@@ -102,14 +103,19 @@ def _lines(result: dict[str, Any]) -> list[str]:
     ]
     if (shift := result["shift_m"]) is not None:
         lines.append(
-            f"towers lie {shift[0]:+.2f} m east and {shift[1]:+.2f} m north of their places in the "
-            "register, in the median"
+            f"towers lie {_signed(shift[0])} m east and {_signed(shift[1])} m north of their "
+            "places in the register, in the median"
         )
     differing = [entry for entry in result["entries"] if entry["status"] != "matched"]
     lines += [_entry(entry) for entry in differing[:SHOWN]]
     if len(differing) > SHOWN:
         lines.append(f"and {len(differing) - SHOWN} more: --out writes all, --json prints them")
     return lines
+
+
+def _signed(metres: float) -> str:
+    """A way in cm, without the sign of a zero."""
+    return f"{round(metres, 2) + 0.0:+.2f}"
 
 
 def _entry(entry: dict[str, Any]) -> str:
@@ -122,7 +128,7 @@ def _entry(entry: dict[str, Any]) -> str:
         line += f" at {place[0]:.2f}, {place[1]:.2f}"
     if entry["distance_m"] is not None:
         line += (
-            f", {entry['distance_m']:.2f} m from its place ({entry['east_m']:+.2f} m east, "
-            f"{entry['north_m']:+.2f} m north)"
+            f", {entry['distance_m']:.2f} m from its place ({_signed(entry['east_m'])} m "
+            f"east, {_signed(entry['north_m'])} m north)"
         )
     return line

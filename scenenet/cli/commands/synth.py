@@ -45,10 +45,10 @@ def command(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Make a synthetic survey of a power line, labelled with EDP class codes.
+    """Make a synthetic, labelled survey of a power line.
 
-    The labels have the errors of hand-made labels; --truth keeps a copy without them, with --tiles
-    in a folder of its own.
+    Its class codes are those of the scheme edp. The labels have the errors of hand-made labels;
+    --truth keeps a copy without them, with --tiles in a folder of its own.
 
     A file that exists is replaced only if it is a synthetic survey.
     """

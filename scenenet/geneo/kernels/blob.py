@@ -1,4 +1,4 @@
-"""What fills a volume, such as a crown (the opposite of ``canopy``)."""
+"""What fills a volume, such as a crown (the opposite of the kernel canopy)."""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -113,13 +114,13 @@ class SurveyReport:
         table = pd.DataFrame(list(classes), columns=list(CLASS_COLUMNS))
         return cls(SurveyFacts(**values), table, warnings)
 
-    def text(self) -> str:
-        """A table for the terminal."""
+    def text(self, path: str | Path | None = None) -> str:
+        """A table for the terminal; it begins with the path, or without one with the name."""
         facts = self.facts
         version = f" {facts.version}" if facts.version else ""
         kind = f", point format {facts.point_format}" if facts.version else ""
-        lines = [f"{facts.survey}: {facts.format.upper()}{version}{kind}"]
-        lines.append(f"  points   {facts.n_points:,}".replace(",", " "))
+        lines = [f"{path or facts.survey}: {facts.format.upper()}{version}{kind}"]
+        lines.append(f"  points   {facts.n_points:,}")
         if facts.mins and facts.maxs:
             spans = [high - low for low, high in zip(facts.mins, facts.maxs, strict=True)]
             extent = " x ".join(f"{span:.6g}" for span in spans)
@@ -127,7 +128,7 @@ class SurveyReport:
         if facts.density_per_m2 and facts.area_m2:
             lines.append(
                 f"  density  {facts.density_per_m2:.1f} points per m2 over "
-                f"{facts.area_m2:,.0f} m2 with points".replace(",", " ")
+                f"{facts.area_m2:,.0f} m2 with points"
             )
         epsg = f" (EPSG:{facts.epsg})" if facts.epsg else ""
         lines.append(f"  CRS      {facts.crs or 'none'}{epsg}")

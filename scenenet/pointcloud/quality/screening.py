@@ -132,11 +132,15 @@ class Screening:
         found += [Finding(*each) for each in self._steps.findings()]
         relief = [Finding(*each) for each in self._relief.findings(self.n_points)]
         # Coordinates that are not in metres have no density.
-        found += relief or [Finding(*each) for each in self._density.findings(self.n_points)]
+        found += relief or [Finding(*each) for each in self._thin()]
         if self.scheme is not None:
             codes = self.counts, self.scheme, self.info.format, self._target
             found += [Finding(*each) for each in code_findings(*codes)]
         return found
+
+    def _thin(self) -> list[tuple[str, str]]:
+        """A density that hides towers, where towers are looked for."""
+        return self._density.findings(self.n_points) if self._target.is_tower else []
 
     def stray(self) -> list[Finding]:
         """Whether the extent of the survey is that of a few points far from the others."""

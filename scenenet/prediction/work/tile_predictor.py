@@ -70,7 +70,7 @@ def predict_file(
     predict = TilePredictor(model, card.measurement, spool.voxel_size, fullest)
     with atomic(out) as partial, partial.open("wb") as stream:
         blocks = BlockWriter(stream, PREDICTED_KINDS)
-        label = f"{own.file.path.name}: tiles predicted"
+        label = f"{own.file.path.name}: blocks predicted ({card.finds.name})"
         for together in _together(track(tiles, label, total=len(codes))):
             predicted = predict(spool, together)
             for tile, (probability, shares) in zip(together, predicted, strict=True):

@@ -8,6 +8,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+from scenenet.core.columns import written
 from scenenet.prediction.tower_lists import arrays, write_layer
 from scenenet.review.found_list import FoundList
 from scenenet.review.record import RecordedFiles
@@ -46,7 +47,8 @@ def write_comparison(comparison: Comparison, found: FoundList, files: RecordedFi
         with table.open("w", encoding="utf-8", newline="") as stream:
             writer = csv.DictWriter(stream, list(COLUMNS), lineterminator="\n")
             writer.writeheader()
-            writer.writerows(asdict(entry) for entry in comparison.entries)
+            for entry in comparison.entries:  # all of its numbers are lengths
+                writer.writerow({name: written(value) for name, value in asdict(entry).items()})
         _write_layers(package, comparison.entries, found)
 
 

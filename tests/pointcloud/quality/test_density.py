@@ -8,6 +8,7 @@ import pytest
 from scenenet.pointcloud import PointCloud, write_las
 from scenenet.pointcloud.quality.check import check_survey
 from scenenet.pointcloud.quality.screening import survey_warnings
+from scenenet.pointcloud.targets import Target
 
 
 def gap_warnings(tmp_path, density: float, side: float = 60.0) -> list[str]:
@@ -32,6 +33,12 @@ def test_a_thin_survey_is_said_with_its_density(tmp_path, density):
 @pytest.mark.parametrize("density", [20.0, 80.0])
 def test_a_dense_survey_is_not(tmp_path, density):
     assert gap_warnings(tmp_path, density) == []
+
+
+def test_a_thin_survey_is_no_fault_where_no_towers_are_looked_for(tmp_path):
+    assert gap_warnings(tmp_path, 5.0)
+    lamps = survey_warnings(tmp_path / "survey.laz", target=Target.parse("lamp=19"))
+    assert not [text for text in lamps if "have gaps" in text]
 
 
 def test_a_survey_so_thin_that_the_unit_is_in_doubt_has_one_warning(tmp_path):

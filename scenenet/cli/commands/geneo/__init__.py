@@ -11,5 +11,5 @@ COMMANDS = {
     "try": trial,
     "certify": certify,
 }
-HELP = "List, show, write and try kernels, and certify the GENEO properties of a model."
+HELP = "List, show, write and try kernels; certify models."
 EPILOG = "scenenet geneo COMMAND --help explains a command, with examples."

@@ -16,7 +16,9 @@ EXAMPLES = ("scenenet geneo list", "scenenet geneo list --kernels my_kernels/ --
 
 
 def command(kernels: Kernels = None, as_json: AsJson = False) -> None:
-    """List all kernels: what each responds to, its parameters, and its origin.
+    """List all kernels and what each responds to.
+
+    With their parameters and origins.
 
     Provided kernels are run. The exit code is 1 if one of them fails; the others are listed.
     """

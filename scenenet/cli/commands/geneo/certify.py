@@ -19,7 +19,9 @@ def command(
     measurements: Measurements = None,
     as_json: AsJson = False,
 ) -> None:
-    """Verify which GENEO properties a model has, by calculation and measurement.
+    """Verify which GENEO properties a model has.
+
+    Some are calculated, the others measured.
 
     The exit code is 0 whether the properties hold or not.
     """

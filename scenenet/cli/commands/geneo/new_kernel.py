@@ -20,7 +20,9 @@ def command(
     kernels: Kernels = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a kernel file NAME.py to begin from, and its test test_NAME.py.
+    """Write a kernel file to begin from, and its test.
+
+    The files are NAME.py and test_NAME.py.
 
     The test passes as it is written: pytest test_NAME.py. A file that exists is replaced only if
     it was not changed since this command wrote it.
@@ -29,4 +31,4 @@ def command(
 
     kernel, test = write_template(name, out, overwrite=overwrite)
     print(f"{kernel}: the kernel; {test}: its test")
-    print(f"try it: scenenet geneo show {name} --kernels {kernel}")
+    print(f"look at it: scenenet geneo show {name} --kernels {kernel}")

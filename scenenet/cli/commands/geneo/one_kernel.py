@@ -50,7 +50,9 @@ def command(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Show a kernel: its formula, its parameters in words, its values, and what is true of it.
+    """Show the formula and the values of a kernel.
+
+    With its parameters in words, and what is true of it.
 
     The slices show the values in ninths of the largest one; zero is a dot. A kernel with a
     direction is shown along x.
@@ -88,7 +90,9 @@ def command(
         "facts": asdict(facts),
         "values": kernel.tolist(),
     }
+    key = "9 is the largest value and . is 0; + and - are less than a ninth of it"
     slices = ["from the side, up is up:", *side, "", f"from above, at z = {height:g} m:", *top]
+    slices += ["", key]
     show(
         data,
         as_json,

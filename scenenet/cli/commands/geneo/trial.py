@@ -67,7 +67,9 @@ def command(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Try a kernel on a survey: its response to each class, and where it is highest.
+    """Measure what a kernel responds to in a survey.
+
+    Its response to each class, and where it is highest.
 
     The response is that of the kernel alone at each occupied voxel, before any training. A large
     survey is tried on a square (--at, --window), which the output names.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import gc
 import sys
 from functools import cache
 from typing import Any
@@ -17,7 +16,6 @@ def give_back() -> None:
     """
     trim = _trim()
     if trim is not None:
-        gc.collect()
         trim(0)
 
 

@@ -79,7 +79,7 @@ class SurveyDetections:
         """The area with a number, and ``beside`` tiles around it."""
         wider = partial(self._area, x, y, 2 * beside)
         core, seen = self._box(x, y, 0), self._box(x, y, beside)
-        return DetectedArea(self._voxels(x, y, beside), core, seen, wider)
+        return DetectedArea(self._kept(x, y, beside), core, seen, wider)
 
     def _voxels(self, x: int, y: int, beside: int) -> DetectedVoxels:
         """The voxels in the area with a number, and in ``beside`` tiles around it."""

@@ -108,8 +108,8 @@ def predict_survey(
         if first.target.is_tower:
             if not folder.towers.exists():
                 write_json(folder.towers, find_in_survey(search, survey.given.name).to_json())
-            give_back()
             found = FoundTowers.from_json(read_json(folder.towers))
+            give_back()
         further = [
             FurtherModel(each, joined.spool_at(each.layer), predicted)
             for each, predicted in zip(used[1:], tiles[1:], strict=True)

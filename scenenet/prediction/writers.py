@@ -157,6 +157,7 @@ def _write_lists(
         write_conductors_csv(conductors, prediction.line, prediction.unit_sizes)
         if prediction.clearances is not None:
             write_clearances_csv(clearances, prediction.clearances, prediction.unit_sizes)
+    give_back()
     if files.page is not None:
         write_page(prediction, lists[files.page])
     if files.status is not None:

@@ -25,7 +25,7 @@ ROUNDS = 5
 """Number of times that the curves are fitted, each time with less weight for what is far off."""
 
 NOISE_M = 0.05
-"""m from a curve from which points count less."""
+"""m from a curve from which points count less; of a bundle twice their median distance."""
 
 FEWEST, SHORTEST_M = 5, 5.0
 """Smallest number of points that show a conductor, and m along it."""
@@ -112,7 +112,7 @@ def _bends(passing: list[tuple[Wire, Wire]]) -> tuple[float, float]:
     Each conductor is a straight line, all have one curvature and one bend in common.
     """
     n = len(passing)
-    rows, t, z = [], [], []
+    rows, t, z, of_pair = [], [], [], []
     for i, pair in enumerate(passing):
         for wire in pair:
             design = np.zeros((len(wire.s), 2 * n + 2))
@@ -121,16 +121,28 @@ def _bends(passing: list[tuple[Wire, Wire]]) -> tuple[float, float]:
             rows.append(design)
             t.append(wire.t)
             z.append(wire.z)
-    design = np.concatenate(rows)
+            of_pair.append(np.full(len(wire.s), i))
+    design, which = np.concatenate(rows), np.concatenate(of_pair)
     # Seen from above a conductor is straight.
     straight = np.delete(design, -2, axis=1)
-    return _last(design, np.concatenate(z)), _last(straight, np.concatenate(t))
+    return _last(design, np.concatenate(z), which), _last(straight, np.concatenate(t), which)
 
 
-def _last(design: np.ndarray, values: np.ndarray) -> float:
-    """The last coefficient of a robust fit of ``values`` (N,) by ``design`` (N, K)."""
-    weight = np.ones(len(values))
-    for _ in range(ROUNDS):
+def _last(design: np.ndarray, values: np.ndarray, which: np.ndarray) -> float:
+    """The last coefficient of a robust fit of ``values`` (N,) by ``design`` (N, K).
+
+    The wires of a bundle are a few decimetres apart. If points of one of them counted less, the fit
+    would follow one wire on one side of the axis and another on the other, as if the bundle turned.
+
+    Args:
+        which: (N,) number of the conductor of each value.
+    """
+    fit = np.linalg.lstsq(design, values, rcond=None)[0]
+    off = np.abs(values - design @ fit)
+    wide = [2 * np.median(off[which == wire]) for wire in range(which.max() + 1)]
+    noise = np.maximum(wide, NOISE_M)[which]
+    for _ in range(ROUNDS - 1):
+        weight = 1 / np.sqrt(1 + (off / noise) ** 2)
         fit = np.linalg.lstsq(design * weight[:, None], values * weight, rcond=None)[0]
-        weight = 1 / np.sqrt(1 + ((values - design @ fit) / NOISE_M) ** 2)
+        off = np.abs(values - design @ fit)
     return float(fit[-1])

@@ -138,7 +138,7 @@ def test_an_absolute_path_is_not_changed(root):
             "north\tempty\tedp\tnew",
             "empty is a folder without LAS and LAZ files, and",
         ),
-        ("north\tdata/*.xyz\tedp\tnew", "data/*.xyz: there is no LAS or LAZ file in it"),
+        ("north\tdata/*.xyz\tedp\tnew", "data/*.xyz: no LAS or LAZ file matches this pattern"),
         ("north\tbad.vpc\tedp\tnew", "bad.vpc: this is not a tile index: no item in it has assets"),
         ("north\tsurveys.tsv\tedp\ttrain", "surveys.tsv is not one of .las, .laz, .npy, .pt"),
         ("north\tts40k\tedp\tnew", "is a folder; samples in a folder can only be trained on"),

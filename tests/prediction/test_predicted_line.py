@@ -192,6 +192,16 @@ def test_the_summary_counts_the_line_and_says_what_its_positions_are(predicted):
     assert line["positions"] == AS_FLOWN
 
 
+def test_the_key_of_the_map_has_only_what_is_on_it(predicted):
+    page = predicted.page.read_text(encoding="utf-8")
+    key = page.partition('<ul class="key">')[2].partition("</ul>")[0]
+    assert "> conductor</li>" in key and "tower found</li>" in key
+    fields = pyogrio.raw.read(predicted.geopackage, layer="line_notes")
+    what = dict(zip(fields[0]["fields"], fields[3], strict=True))["what"]
+    assert {kind for kind in NOTE_KINDS if f"> {kind}</li>" in key} == set(what)
+    assert "cable of no line" not in key and "earth wire" not in key
+
+
 def test_a_table_of_sags_changes_clearances_and_the_page_alone(
     predicted, line, model, wire_finder, tmp_path
 ):

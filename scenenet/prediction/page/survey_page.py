@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from html import escape
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
 
 ASSETS = Path(__file__).parent / "assets"
 
+_CLASS = re.compile(r'class="([^"]*)"')
 STYLES = ("page.css", "line.css")
 SCRIPTS = (
     "common.js",
@@ -153,7 +155,7 @@ def survey_page(
         warnings=warnings(prediction, content.budget),
         caveat=caveats,
         shapes=shapes,
-        **_line_parts(content, units, positions_said(prediction)),
+        **_line_parts(content, units, positions_said(prediction), shapes),
         headings=tower_headings(planar, vertical),
         rows=tower_rows(content.towers),
         files=file_table(prediction.files),
@@ -172,11 +174,15 @@ def as_measured(prediction: SurveyPrediction) -> SurveyPrediction:
     return replace(prediction, line=with_sags(prediction.line, prediction.clearance.sags))
 
 
-def _line_parts(content: PageContent, units: LengthUnits, positions: str) -> dict[str, str]:
-    """The parts of the page about spans; empty where it lists none."""
+def _line_parts(
+    content: PageContent, units: LengthUnits, positions: str, shapes: str
+) -> dict[str, str]:
+    """The parts of the page about spans; empty where it lists none. The key has what is among the
+    ``shapes`` of the map."""
     names = ("tabs", "key", "spans", "skip")
     if not content.spans:
         return {f"line_{name}": "" for name in names}
+    classes = set(_CLASS.findall(shapes))
     values = {
         "n_towers": markup.count(len(content.towers)),
         "n_spans": markup.count(len(content.spans)),
@@ -185,7 +191,10 @@ def _line_parts(content: PageContent, units: LengthUnits, positions: str) -> dic
         "caveat": escape(positions),
         "notes": note_key(),
     }
-    return {f"line_{name}": _template(f"line_{name}.html").substitute(values) for name in names}
+    parts = {f"line_{name}": _template(f"line_{name}.html").substitute(values) for name in names}
+    entries = parts["line_key"].splitlines(keepends=True)
+    parts["line_key"] = "".join(e for e in entries if set(_CLASS.findall(e)) & classes)
+    return parts
 
 
 def _template(name: str) -> Template:

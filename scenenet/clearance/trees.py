@@ -18,6 +18,16 @@ LAYER_M, FILLED = 2.0, 0.5
 """m, layers of the upper half of a tree, and the smallest share of them with a point: birds and
 returns from the air have nothing below them."""
 
+COLUMN_M = 3
+"""m, edge of the columns, of cells of a metre, in which a crown has to stop pulses."""
+
+STOPPED, OVER_M = 0.05, 3
+"""Smallest share of the points of a column that end down to so many m below the top
+of a crown. Returns from the air are fewer, also where they lie close together above a wood."""
+
+TALLEST_M = 100
+"""m, height from which points are counted together: no tree is higher."""
+
 DENSE = 0.1
 """Smallest share of the points in a crown's column that the upper half of the tree has."""
 
@@ -46,6 +56,7 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
 
     joined = (around.kind == PLANT) & ~around.lone
     rows = np.flatnonzero(joined & (around.height >= min_height / 2))
+    rows = rows[~_in_the_air(around, rows)]
     none = Trees(np.empty((0, 3)), np.empty(0))
     if not len(rows):
         return none
@@ -74,6 +85,26 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
             kept.append(row)
     feet = np.column_stack((xy[kept], around.ground.height(xy[kept])))
     return Trees(feet, height[kept])
+
+
+def _in_the_air(around: Surroundings, rows: np.ndarray) -> np.ndarray:
+    """(r,) bool: which points at rows (r,) are higher than the crowns in their column."""
+    from scipy import ndimage
+
+    if not len(rows):
+        return np.zeros(0, bool)
+    places = [np.floor(around.xyz[:, axis]).astype(int) for axis in range(2)]
+    column, row = (place - place.min() for place in places)
+    highest = min(int(around.height[rows].max()), TALLEST_M)
+    # The layer 0 is the highest one.
+    down = highest - np.clip(around.height, 0, highest).astype(int)
+    shape = (highest + 1, int(column.max()) + 1, int(row.max()) + 1)
+    flat = (down * shape[1] + column) * shape[2] + row
+    above = np.bincount(flat, minlength=int(np.prod(shape))).reshape(shape).cumsum(axis=0)
+    edge = (1, COLUMN_M, COLUMN_M)
+    above = ndimage.convolve(above, np.ones(edge, int), mode="constant")
+    reached = np.minimum(down[rows] + OVER_M, highest), column[rows], row[rows]
+    return np.asarray(above[reached] < STOPPED * above[-1][reached[1:]])
 
 
 @dataclass(frozen=True)

@@ -91,6 +91,23 @@ def test_trees_are_found_one_by_one(scene, scheme):
     np.testing.assert_allclose(trees.feet[:, 2], ground_at(trees.feet[:, :2]), atol=0.3)
 
 
+@pytest.mark.parametrize("scheme", [ASPRS, None])
+def test_returns_from_the_air_above_a_tree_are_not_its_top(scene, scheme):
+    xyz, codes = scene
+    rng = np.random.default_rng(3)
+    x, y, height = TREES[2]
+    ground = ground_at(np.array([[x, y]]))[0]
+    strays = rng.uniform((x - 3, y - 3, height + 1), (x + 3, y + 3, height + 14), (40, 3))
+    kept = np.isin(codes, (2, 5))
+    # Producers do not mark all of them as noise.
+    xyz = np.concatenate((xyz[kept], strays + np.array([0, 0, ground])))
+    codes = np.concatenate((codes[kept], np.full(40, 1, np.uint8)))
+    around = surroundings(xyz, codes, scheme, FEW)
+    assert ((around.kind == PLANT) & ~around.lone & (around.height > height + 1)).any()
+    trees = find_trees(around, min_height=3.0)
+    assert sorted(trees.height) == pytest.approx(sorted(TREES[:, 2]), abs=0.4)
+
+
 def test_lower_trees_than_asked_for_are_left_out(scene):
     xyz, codes = scene
     assert len(find_trees(surroundings(xyz, codes, ASPRS, FEW), min_height=12.0).height) == 2

@@ -107,6 +107,26 @@ def test_a_contradiction_stops_only_its_file(call, pole_survey, pole_model, tmp_
     assert [report["epsg"] for report in json.loads(checked.out)] == [32629, 32629]
 
 
+def test_check_says_what_predict_does_with_feet_and_degrees(
+    call, in_feet, pole_survey, pole_model, tmp_path
+):
+    feet = call("check", in_feet, "--crs", FEET)
+    assert feet.code == 0
+    assert "the unit of the coordinates is the foot" in feet.out
+    assert "scenenet predict and explain convert it" in feet.out
+    out = tmp_path / "out"
+    assert predict(call, in_feet, "--model", pole_model, "--out", out, "--crs", FEET).code == 0
+    cloud, path = read(pole_survey), tmp_path / "degrees.laz"
+    xyz = (cloud.xyz - cloud.xyz.mean(axis=0)) * (1e-5, 1e-5, 1.0) + (-8.0, 41.0, 100.0)
+    write_las(path, PointCloud(xyz, cloud.classification, crs=pyproj.CRS(4326)), scale=1e-8)
+    degrees = call("check", path, in_feet, "--json")
+    assert degrees.code == 1
+    assert f"error: {path}: it cannot be used: the coordinates are in degrees" in degrees.err
+    assert len(json.loads(degrees.out)) == 2
+    refused = predict(call, path, "--model", pole_model, "--out", out)
+    assert refused.code == 1 and "the coordinates are in degrees" in refused.err
+
+
 @pytest.mark.parametrize("text", ["EPSG:99999", "no system", "EPSG:5703", "", "field.laz"])
 @pytest.mark.parametrize("command", ["predict", "check", "explain"])
 def test_what_is_no_system_is_a_wrong_usage(call, pole_survey, pole_model, tmp_path, command, text):

@@ -37,10 +37,11 @@ def command(
     A folder of LAS and LAZ files, a pattern such as 'tiles/*.laz' in quotes and a tile index (.vpc,
     STAC .json, .gpkg) give a report on each file.
 
-    The exit code is 1 if a file cannot be read; the others are still checked.
+    The exit code is 1 if a file cannot be read, or if its coordinates are no lengths, such as
+    degrees; the others are still checked.
     """
     from scenenet.core.errors import warn
-    from scenenet.pointcloud.quality.check import check_survey
+    from scenenet.pointcloud.quality.check import check_survey, raise_if_no_lengths
 
     system = coordinate_system(crs)
     scheme = None if codes is None else codes.value
@@ -54,6 +55,7 @@ def command(
                 with failures.collect():
                     reports.append(check_survey(path, scheme, crs=system))
                     texts.append(reports[-1].text(path))
+                    raise_if_no_lengths(path, reports[-1], system)
     if as_json:
         print(json.dumps([report.to_json() for report in reports], indent=2))
     elif texts:

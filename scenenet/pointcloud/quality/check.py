@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
+from scenenet.core.errors import InputError
 from scenenet.core.settings import Settings
 from scenenet.pointcloud.class_schemes import ClassScheme, class_scheme
 from scenenet.pointcloud.cloud import PointCloud
@@ -31,7 +32,7 @@ from scenenet.pointcloud.quality.report import (
 from scenenet.pointcloud.quality.screening import Finding, Screening, of_samples
 from scenenet.pointcloud.reading import SurveyInfo, iter_chunks, survey_info
 from scenenet.pointcloud.ts40k import sample_files
-from scenenet.pointcloud.units import look_like_degrees, unit_name
+from scenenet.pointcloud.units import look_like_degrees, not_metres, unit_name
 
 if TYPE_CHECKING:
     import laspy
@@ -132,6 +133,27 @@ def check_survey(
         checked = [_check(sample, scheme, settings, crs) for sample in sample_files(path)]
         return _together(path, checked, scheme)
     return _check(path, scheme, settings, crs)[0]
+
+
+def raise_if_no_lengths(
+    path: str | Path, report: SurveyReport, crs: pyproj.CRS | None = None
+) -> None:
+    """Refuse a survey that ``scenenet predict`` refuses too. Its report says more.
+
+    Args:
+        path: what ``report`` is on.
+        crs: as ``check_survey``.
+
+    Raises:
+        InputError: the coordinates are known to be no lengths, such as degrees.
+    """
+    facts = report.facts
+    if Path(path).is_dir() or facts.mins is None or facts.maxs is None:
+        return
+    info = survey_info(path, crs)
+    reason = not_metres(info.record, facts.mins, facts.maxs, info.scales)
+    if reason and not reason.is_length:
+        raise InputError(f"it cannot be used: {reason.problem}", file=str(path))
 
 
 def _check(

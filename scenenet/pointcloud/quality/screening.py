@@ -21,7 +21,7 @@ from scenenet.pointcloud.quality.steps import CoordinateSteps
 from scenenet.pointcloud.reading import SurveyInfo, iter_chunks, survey_info
 from scenenet.pointcloud.targets import TOWER, Target
 from scenenet.pointcloud.ts40k import sample_files
-from scenenet.pointcloud.units import NotMetres, not_metres
+from scenenet.pointcloud.units import CONVERT, NotMetres, not_metres
 
 SAMPLE_POINTS = 50_000
 """Points of a chunk that are looked at closely."""
@@ -30,6 +30,9 @@ STRAY_FACTOR = 10.0
 MIN_POINTS = 100
 """Fewer points do not show what the extent of a survey is."""
 CONVERTED = "it is converted, and the results are in the units of the survey"
+CONVERTS = (
+    "scenenet predict and explain convert it, and give results in this unit. Others need metres"
+)
 NO_SYSTEM = "the file names no coordinate system; its coordinates are taken to be in metres"
 
 GIVEN_SYSTEM = "the file names no coordinate system; it is taken to be in {}, as given"
@@ -121,7 +124,8 @@ class Screening:
             found.append(Finding("given system", GIVEN_SYSTEM.format(self.info.crs.name)))
         if reason := self.not_metres:
             place = f"{reason.place}: " if reason.place else ""
-            return [*found, Finding("unit", f"{place}{reason.problem}. {reason.remedy}")]
+            remedy = f"{CONVERTS} {CONVERT}" if reason.is_length else reason.remedy
+            return [*found, Finding("unit", f"{place}{reason.problem}. {remedy}")]
         if self._converted and (reason := self.info.not_metres):
             found.append(Finding("converted", f"{reason.problem}; {CONVERTED}"))
         if self.info.crs is None and not self.info.record.problems:

@@ -7,8 +7,8 @@ results for it. ``scenenet.report.page`` has their order.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from urllib.parse import quote
@@ -31,11 +31,13 @@ class ReportContext:
         results: the result folder.
         thesis: published numbers.
         folder: of the page, for links to other files; None for no links.
+        failed: new surveys that cannot be used -> why.
     """
 
     results: Results
     thesis: Thesis
     folder: Path | None = None
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def pictures(self) -> list[Picture]:

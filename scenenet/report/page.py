@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from scenenet.core.errors import InputError
@@ -56,7 +56,12 @@ SECTIONS: Sequence[SectionMaker] = (
 
 
 def write_report(
-    results: Results, thesis: Thesis, out: str | Path, title: str = TITLE
+    results: Results,
+    thesis: Thesis,
+    out: str | Path,
+    title: str = TITLE,
+    *,
+    failed: Mapping[str, str] | None = None,
 ) -> list[Section]:
     """Write the report of a result folder from its tables, figures and predictions.
 
@@ -66,6 +71,7 @@ def write_report(
         out: HTML file to write; needs no other file and no network. It links to the pages of
             classified surveys.
         title: of the page.
+        failed: new surveys that cannot be used -> why.
 
     Returns:
         the sections of the page.
@@ -73,7 +79,7 @@ def write_report(
     Raises:
         InputError: a result file is broken, or a figure is missing.
     """
-    context = ReportContext(results, thesis, Path(out).parent)
+    context = ReportContext(results, thesis, Path(out).parent, failed or {})
     made = [section for make in SECTIONS if (section := make(context)) is not None]
     write_text(out, render(made, title, "scenenet report", thesis.source))
     return made

@@ -146,6 +146,11 @@ def test_a_survey_that_cannot_be_read_stops_its_own_jobs_and_the_log_says_why(pr
     assert log.startswith("Error: surveys/broken.laz: ")
     assert "Traceback" not in log
     assert log.splitlines()[0] in done.stdout
+    assert "1 of 2 new surveys failed:\n  surveys/broken.laz: " in done.stdout + done.stderr
+    assert project.snakemake("results/report/index.html").returncode == 0
+    page = (project.results / "report/index.html").read_text()
+    assert "surveys/broken.laz: " in page
+    assert page.count("Map, list and picture of each tower") == 1, "of the other survey"
 
 
 def test_a_fault_of_the_code_leaves_its_traceback_in_the_log(project):

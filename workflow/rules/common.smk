@@ -24,6 +24,7 @@ from scenenet.core.provenance import fingerprint
 from scenenet.results.tables import print_scores
 from scenenet.config.read_surveys import read_surveys
 from scenenet.config.tile_plan import NEIGHBOURS_M, HeaderCache, plan_tiles
+from scenenet.config.unusable import print_failed, unusable_surveys
 
 WORKFLOW = Path(workflow.current_basedir).parent
 PROJECT = WORKFLOW.parent
@@ -225,6 +226,8 @@ try:
     SURVEYS = {survey.name: survey for survey in read_surveys(settings, warn=warn_once)}
     THESIS = {"thesis": fingerprint(own_file(settings.thesis))}
     PLANS = plans_of_tiles()
+    # Their own jobs fail and say why. The report lists them, and nothing else waits for them.
+    FAILED = unusable_surveys(SURVEYS.values())
     KERNELS = settings.outside_kernels()
 except InputError as error:
     raise WorkflowError(str(error)) from None

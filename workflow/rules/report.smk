@@ -79,7 +79,13 @@ rule report:
         mem_mb=1000,
         runtime=10,
     params:
-        job=job("report", {}, results=all_results(), input=THESIS),
+        job=job(
+            "report",
+            {},
+            results=all_results(),
+            input=THESIS,
+            **({"failed": FAILED} if FAILED else {}),
+        ),
     message:
         "Writing the report"
     script:

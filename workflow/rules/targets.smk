@@ -22,7 +22,7 @@ def every(stage, output, **values):
         values: wildcard -> values, if not all of them.
     """
     names = [stage] if rules.has(stage) else [f"{stage}_{kind}" for kind in MODEL_SUFFIXES]
-    return [file for name in names for file in _files(getattr(rules, name), output, values)]
+    return [file for name in names for file in _files(getattr(rules, name), output, values, FAILED)]
 
 
 def every_prediction(output):
@@ -72,11 +72,11 @@ def every_record():
         file
         for rule in rules._rules.values()
         if "provenance" in rule.output.keys() and "synthetic" not in rule.rule.wildcard_names
-        for file in _files(rule, "provenance", {})
+        for file in _files(rule, "provenance", {}, FAILED)
     ]
 
 
-def _files(rule, output, values):
+def _files(rule, output, values, failed=()):
     patterns, declared = (getattr(of.output, output) for of in (rule, rule.rule))
     if "tile" in rule.rule.wildcard_names:
         each = [(survey, tile) for survey in TILED for tile in PLANS[survey].tiles]
@@ -88,16 +88,23 @@ def _files(rule, output, values):
             for file in expand(patterns, survey=survey, tile=tile, **others)
         ]
     single = isinstance(patterns, str)
-    files = expand(list([patterns] if single else patterns), **{**_wildcards(rule), **values})
+    files = expand(
+        list([patterns] if single else patterns), **{**_wildcards(rule, failed), **values}
+    )
     # The outputs that ``rules`` hands on have lost this flag.
     return [local(file) for file in files] if single and is_flagged(declared, "local") else files
 
 
-def _wildcards(rule):
-    """Wildcard -> its values in the outputs of a rule."""
+def _wildcards(rule, failed=()):
+    """Wildcard -> its values in the outputs of a rule, without surveys that failed."""
     limits = rule.rule.wildcard_constraints
     return {
-        name: [value for value in values if re.fullmatch(limits.get(name, ".*"), str(value))]
+        name: [
+            value
+            for value in values
+            if re.fullmatch(limits.get(name, ".*"), str(value))
+            and not (name == "survey" and value in failed)
+        ]
         for name, values in VALUES.items()
         if name in rule.rule.wildcard_names
     }
@@ -156,7 +163,7 @@ def results_of(
 
 def all_results():
     return results_of(
-        predicted=NEW,
+        predicted=[survey for survey in NEW if survey not in FAILED],
         studies=VALUES["study"],
         experiments=EXPERIMENTS,
         predicts=settings.predict.model,

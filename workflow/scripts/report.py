@@ -9,7 +9,7 @@ def report(job: _job.Job) -> None:
     from scenenet.report import write_report
 
     thesis = read_thesis(job.input.thesis)
-    write_report(results_of(job), thesis, job.output.report)
+    write_report(results_of(job), thesis, job.output.report, failed=job.identity.get("failed", {}))
 
 
 _job.run(report)

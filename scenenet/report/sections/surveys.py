@@ -76,6 +76,7 @@ def predictions(context: ReportContext) -> Section | None:
         blocks += context.figures_of(survey, "predictions")
         blocks.append(_tower_list(survey, found.towers))
         blocks += _not_predicted(survey, found.summary)
+    blocks += _failed(context.failed)
     if not blocks:
         return None
     note = Text(
@@ -103,6 +104,15 @@ def _not_predicted(survey: str, summary: PredictionSummary) -> list[Block]:
     columns = [Column("file", "file"), Column("status", "status"), Column("error", "reason")]
     caption = f"{len(rows)} of {len(summary.files)} files of {survey} were not predicted."
     return [table(pd.DataFrame(rows), columns, caption)]
+
+
+def _failed(failed: Mapping[str, str]) -> list[Block]:
+    """The surveys that cannot be used, with the reasons."""
+    if not failed:
+        return []
+    rows = pd.DataFrame(sorted(failed.items()), columns=["survey", "reason"])
+    columns = [Column("survey", "survey"), Column("reason", "reason")]
+    return [Heading("Failed"), table(rows, columns, "New surveys that cannot be used.")]
 
 
 def _tower_list(survey: str, towers: Sequence[SurveyTower]) -> Block:

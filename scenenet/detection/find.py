@@ -144,7 +144,9 @@ class _Measurement:
             spans = self._leading_on(shape)
             if not replace(shape, spans=spans).carries(needed):
                 continue
-            tested = self.bent and shape.profile.width > POLE_M
+            # In a dip conductors may pass a tower in a straight line.
+            carried = shape.head.is_even(shape.profile.width / 2)
+            tested = self.bent and shape.profile.width > POLE_M and not carried
             if tested and pass_without_bend(spans, np.array([shape.x, shape.y])):
                 continue
             tower = MeasuredTower.of(rough, shape, spans)

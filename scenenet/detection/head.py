@@ -38,6 +38,10 @@ REACH, WIDE_REACH = 0.4, 0.5
 far, the height of a window tower may be that of its bridge, which is about as long, and often only
 the conductors in the window are seen."""
 
+CROSSARM_M, EVEN = 1.0, 0.7
+"""m beyond the body that crossarms on both sides reach at least, and the least reach of the shorter
+one as a share of that of the longer one."""
+
 FACE = 0.1
 """Smallest number of points in a step of the thickness of a crossarm, as a share of that in its
 fullest step. Both faces of a truss have as many; twigs beside it have few."""
@@ -80,6 +84,14 @@ class Head:
     def reach(self) -> float:
         """m, largest distance of a cell from the axis."""
         return max(map(abs, self.extent))
+
+    def is_even(self, half_width: float) -> bool:
+        """Whether crossarms reach beyond a body of ``half_width`` m on both sides, about as far.
+
+        The branches of a tree do not.
+        """
+        short, long = sorted(side - half_width for side in (-self.extent[0], self.extent[1]))
+        return short >= CROSSARM_M and short >= EVEN * long
 
     def covers(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
         """(N,) bool, whether positions in the plane are in a cell: ``t`` m to the right of the

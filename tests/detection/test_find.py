@@ -149,3 +149,12 @@ def test_a_tree_that_conductors_pass_without_a_bend_is_no_tower():
     assert len(find(under_conductors(0.15), [FOOT], height=14)) == 1
     assert find(under_conductors(0.0), [FOOT], height=14) == []
     assert len(find(under_conductors(0.0), [FOOT], height=14, bent=False)) == 1
+
+
+@pytest.mark.parametrize(("left", "towers"), [(-4.0, 1), (0.0, 0)])
+def test_crossarms_on_both_sides_carry_conductors_that_do_not_bend(left, towers):
+    """As in a dip between two hills; the branch of a tree is on one side."""
+    t = np.arange(left, 4.01, 0.1)
+    arms = np.column_stack([t, np.zeros(len(t)), np.full(len(t), 14.3)])
+    xyz = np.concatenate([under_conductors(0.0), FOOT + arms])
+    assert len(find(xyz, [FOOT], height=14)) == towers

@@ -38,9 +38,9 @@ REACH, WIDE_REACH = 0.4, 0.5
 far, the height of a window tower may be that of its bridge, which is about as long, and often only
 the conductors in the window are seen."""
 
-CROSSARM_M, EVEN = 1.0, 0.7
-"""m beyond the body that crossarms on both sides reach at least, and the least reach of the shorter
-one as a share of that of the longer one."""
+CROSSARM_M, EVEN, SEEN = 1.0, 0.7, 0.8
+"""m beyond the body that crossarms on both sides reach at least, the least reach of the shorter one
+as a share of that of the longer one, and the least share of their length with points."""
 
 FACE = 0.1
 """Smallest number of points in a step of the thickness of a crossarm, as a share of that in its
@@ -86,12 +86,15 @@ class Head:
         return max(map(abs, self.extent))
 
     def is_even(self, half_width: float) -> bool:
-        """Whether crossarms reach beyond a body of ``half_width`` m on both sides, about as far.
+        """Whether crossarms reach beyond a body of ``half_width`` m on both sides, about as far, and
+        without gaps.
 
         The branches of a tree do not.
         """
-        short, long = sorted(side - half_width for side in (-self.extent[0], self.extent[1]))
-        return short >= CROSSARM_M and short >= EVEN * long
+        left, right = self.extent
+        short, long = sorted((-left - half_width, right - half_width))
+        seen = self.cells.any(axis=1).sum() * CELL_M
+        return bool(short >= CROSSARM_M and short >= EVEN * long and seen >= SEEN * (right - left))
 
     def covers(self, t: np.ndarray, h: np.ndarray) -> np.ndarray:
         """(N,) bool, whether positions in the plane are in a cell: ``t`` m to the right of the

@@ -86,7 +86,7 @@ class Head:
         return max(map(abs, self.extent))
 
     def is_even(self, half_width: float) -> bool:
-        """Whether crossarms reach beyond a body of ``half_width`` m on both sides, about as far, and
+        """Whether crossarms reach beyond a body of ``half_width`` m on both sides, as far and
         without gaps.
 
         The branches of a tree do not.

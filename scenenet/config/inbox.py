@@ -31,13 +31,15 @@ def inbox_surveys(
     if config.new_surveys.folder is None or not (root / config.new_surveys.folder).is_dir():
         return
     listed = {os.path.realpath(root / survey.path) for survey in known}
-    files = [
-        file
-        for file in sorted((root / config.new_surveys.folder).iterdir())
-        if not file.name.startswith(".")
-        and (is_tiled(file) if file.is_dir() else file.suffix.lower() in LAS_SUFFIXES)
-        and os.path.realpath(file) not in listed
-    ]
+    files = []
+    for file in sorted((root / config.new_surveys.folder).iterdir()):
+        if file.name.startswith(".") or os.path.realpath(file) in listed:
+            continue
+        if file.is_dir() and not is_tiled(file):
+            path = Path(config.new_surveys.folder) / file.name
+            warn(f"left out: {path}: it is not a folder of LAS and LAZ files")
+        elif file.is_dir() or file.suffix.lower() in LAS_SUFFIXES:
+            files.append(file)
     owners: dict[str, list[str]] = {survey.name: [survey.path] for survey in known}
     for file in files:
         owners.setdefault(_inbox_name(file), []).append(file.name)

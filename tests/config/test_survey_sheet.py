@@ -282,6 +282,13 @@ def test_a_link_in_the_inbox_that_leads_nowhere_is_left_out(root, capsys, target
     assert f"left out: inbox/gone.laz: {reason}" in capsys.readouterr().err
 
 
+def test_a_folder_without_surveys_in_the_inbox_is_left_out(root, capsys):
+    (root / "inbox" / "empty").mkdir()
+    assert [s.name for s in read(root, new_surveys={"folder": "inbox"})] == ["new_one"]
+    said = "left out: inbox/empty: it is not a folder of LAS and LAZ files"
+    assert said in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("row", ["ab" * 20 + "\tdata/north.laz", "mine\tdata/a{b}.laz"])
 def test_a_row_that_snakemake_cannot_use_is_a_problem_of_the_sheet(root, row):
     (root / "data" / "a{b}.laz").write_bytes(b"")

@@ -43,6 +43,11 @@ if TYPE_CHECKING:
     from scenenet.models.model_file import ModelCard
 
 
+TALL_M = 45.0
+"""Median height of towers, m, above which coordinates without a unit may be in feet: few lines have
+taller towers, and those of medium voltage are 15 m, or 50 feet."""
+
+
 @dataclass(frozen=True)
 class FurtherModel:
     """A model of a prediction besides the first one, with what it predicts.
@@ -184,9 +189,21 @@ class SurveyPrediction:
         """The states of the files that were read."""
         return tuple(state for _, state in readable(self.files))
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What looks wrong about the survey as a whole, as sentences."""
+        heights = [tower.height for tower in self.towers]
+        if self.crs is not None or not heights or np.median(heights) <= TALL_M:
+            return self.survey.notes
+        return (
+            *self.survey.notes,
+            f"the towers are {np.median(heights):.0f} m high in the median, and no coordinate "
+            "system names the unit. If the coordinates are in feet, name the system with --crs",
+        )
+
     def warn(self) -> None:
         """Print what looks wrong about the files; what is wrong with several of them, once."""
-        warn(self.survey.given, self.survey.notes)
+        warn(self.survey.given, self.notes)
         found: dict[str, list[Path]] = {}
         for file in self.files:
             for text in file.warnings:

@@ -232,7 +232,7 @@ def summarise(prediction: SurveyPrediction, outputs: dict[str, str]) -> Predicti
         unit_sizes_m=list(prediction.unit_sizes),
         units=list(prediction.unit_names),
         warnings=[
-            *prediction.survey.notes,
+            *prediction.notes,
             *(text for file in prediction.files for text in file.warnings),
         ],
         files=[file.to_json(prediction.target_names) for file in prediction.files],

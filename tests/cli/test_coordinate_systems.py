@@ -69,6 +69,17 @@ def test_the_given_system_says_that_a_survey_is_in_feet(
     assert json.loads((out / "feet.summary.json").read_text())["units"] == ["foot"] * 3
 
 
+def test_towers_that_are_too_high_raise_the_question_of_feet(
+    call, pole_survey, in_feet, pole_model, tmp_path
+):
+    said = {}
+    for survey in (pole_survey, in_feet):
+        done = predict(call, survey, "--model", pole_model, "--out", tmp_path / survey.stem)
+        assert done.code == 0, done.err
+        said[survey] = "If the coordinates are in feet, name the system with --crs" in done.err
+    assert said == {pole_survey: False, in_feet: True}
+
+
 def test_an_explanation_is_in_the_units_of_the_survey(
     call, pole_survey, in_feet, pole_model, tmp_path
 ):

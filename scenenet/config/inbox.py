@@ -36,8 +36,8 @@ def inbox_surveys(
         if file.name.startswith(".") or os.path.realpath(file) in listed:
             continue
         if file.is_dir() and not is_tiled(file):
-            path = Path(config.new_surveys.folder) / file.name
-            warn(f"left out: {path}: it is not a folder of LAS and LAZ files")
+            folder = Path(config.new_surveys.folder) / file.name
+            warn(f"left out: {folder}: it is not a folder of LAS and LAZ files")
         elif file.is_dir() or file.suffix.lower() in LAS_SUFFIXES:
             files.append(file)
     owners: dict[str, list[str]] = {survey.name: [survey.path] for survey in known}

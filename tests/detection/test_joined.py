@@ -34,10 +34,9 @@ def body(scene, east, north=0.0, left=-5.0, right=5.0, **changes):
 
 def measured(shape):
     """The same as a tower of a survey."""
-    rows = np.arange(3)
     place = shape.x, shape.y, shape.ground.elevation
     size = shape.height, shape.profile.width, shape.profile.free, 1.0
-    return MeasuredTower(*place, *size, shape.spans, 0.9, rows, shape)
+    return MeasuredTower(*place, *size, shape.spans, 0.9, np.array(place[:2]), 3.0, shape)
 
 
 @pytest.fixture(scope="module")

@@ -88,7 +88,10 @@ def find_trees(around: Surroundings, min_height: float) -> Trees:
 
 
 def _in_the_air(around: Surroundings, rows: np.ndarray) -> np.ndarray:
-    """(r,) bool: which points at rows (r,) are higher than the crowns in their column."""
+    """(r,) bool: which points at rows (r,) are returns from the air, above all crowns.
+
+    A crown stops ``STOPPED`` of the pulses of its column by ``OVER_M`` m below its top.
+    """
     from scipy import ndimage
 
     if not len(rows):

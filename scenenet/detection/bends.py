@@ -25,7 +25,7 @@ ROUNDS = 5
 """Number of times that the curves are fitted, each time with less weight for what is far off."""
 
 NOISE_M = 0.05
-"""m from a curve from which points count less; of a bundle twice their median distance."""
+"""m from a curve beyond which points count less; for a bundle, twice their median distance."""
 
 FEWEST, SHORTEST_M = 5, 5.0
 """Smallest number of points that show a conductor, and m along it."""

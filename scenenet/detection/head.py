@@ -86,8 +86,8 @@ class Head:
         return max(map(abs, self.extent))
 
     def is_even(self, half_width: float) -> bool:
-        """Whether crossarms reach beyond a body of ``half_width`` m on both sides, as far and
-        without gaps.
+        """Whether crossarms reach about equally far beyond both sides of a body of ``half_width``
+        m, without gaps.
 
         The branches of a tree do not.
         """

@@ -111,7 +111,7 @@ class _Finder:
         measured = [
             measure(
                 area, own, self._flown_near(area), self._points, self._scheme, self._limits,
-                self._settings,
+                self._settings, self._flown.rejected,
             )
             for area in sections(frame, own, self._settings.reach)
         ]  # fmt: skip

@@ -115,6 +115,7 @@ def measure(
     scheme: ClassScheme | None,
     limits: ClearanceLimits | None,
     settings: ClearanceSettings,
+    rejected: Sequence[Conductor] = (),
 ) -> MeasuredSection:
     """What is near the conductors of a span in a section of it.
 
@@ -125,8 +126,11 @@ def measure(
         points: of the survey.
         scheme: of their class codes; None where heights say what they are.
         limits: for the voltage; None without one.
+        rejected: conductors that are none, of this and other spans.
     """
-    around = look_around(area, flown, points, scheme, settings.few_points, touching=True)
+    around = look_around(
+        area, flown, points, scheme, settings.few_points, rejected, touching=True
+    )  # fmt: skip
     here = area.has(around.xyz) & (around.kind != NO_OBSTACLE)
     xyz, kind = np.compress(here, around.xyz, axis=0), around.kind[here]
     last = max(int(np.ceil(area.frame.length / settings.step)) - 1, 0)
@@ -146,6 +150,7 @@ def look_around(
     points: PointsIn,
     scheme: ClassScheme | None,
     few_points: int,
+    rejected: Sequence[Conductor] = (),
     *,
     touching: bool = False,
 ) -> Surroundings:
@@ -155,6 +160,7 @@ def look_around(
         wires: whose points are left out.
         points, scheme: as ``measure``.
         few_points: of ``ClearanceSettings``.
+        rejected: whose points are obstacles, though a model may take them for wires.
         touching: whether those stay that may be of a wire and hang together with vegetation.
     """
     wide = Area(area.frame, area.first - AROUND_M, area.last + AROUND_M, area.half_width)
@@ -162,7 +168,7 @@ def look_around(
     own = on_wires(found.xyz, wires)
     free = own == AIR
     if found.wire is not None:
-        doubtful = np.flatnonzero(found.wire & free)
+        doubtful = np.flatnonzero(found.wire & free & (on_wires(found.xyz, rejected) == AIR))
         free[doubtful] = ~untraced(area.frame.to_frame(found.xyz[doubtful]))
     codes = None if found.codes is None else found.codes[free]
     around = surroundings(np.compress(free, found.xyz, axis=0), codes, scheme, few_points)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles
     from scenenet.prediction.used_models import UsedModel
+    from scenenet.review.rejected_conductors import RejectedConductors
 
 WIRE_CODES = ", ".join(f"{name} {each.main_code('conductor')}" for name, each in SCHEMES.items())
 """The class code of conductors in each scheme, in words."""
@@ -80,6 +81,21 @@ def chosen_models(
         used = use_models(models, settings, scheme)
     _require_codes(used, settings, scheme)
     return models, used[0].target.is_tower, finds_lines(used)
+
+
+def rejected_conductors(decisions: Sequence[Path] | None) -> RejectedConductors | None:
+    """The conductors that review files reject; None without a file.
+
+    Raises:
+        InputError: a file cannot be read, or rows cannot be used.
+    """
+    from scenenet.review.rejected_conductors import RejectedConductors
+
+    if not decisions:
+        return None
+    rejects = RejectedConductors(tuple(decisions))
+    rejects.check()
+    return rejects
 
 
 def refuse_without_lines(options: Mapping[str, object]) -> None:

@@ -103,10 +103,7 @@ def find_line(
                 )
             )  # fmt: skip
             conductors += own
-    held = {end for span in spans if span.line for end in (span.from_tower, span.to_tower)}
-    notes += [
-        LineNote(tower.x, tower.y, UNHELD, tower.id, 0) for tower in towers if tower.id not in held
-    ]
+    notes += unheld(towers, spans)
     gaps = untraced_spans(towers, spans)
     notes += [gap.note for gap in gaps]
     at_gap = {span_id for gap in gaps for span_id in gap.span_ids}
@@ -116,6 +113,14 @@ def find_line(
     ]
     held_by = supports(towers, spans, conductors)
     return SurveyLine(tuple(spans), tuple(conductors), tuple(notes), tuple(held_by))
+
+
+def unheld(towers: Sequence[LineTower], spans: Sequence[LineSpan]) -> list[LineNote]:
+    """The towers that no span of a line leads to."""
+    held = {end for span in spans if span.line for end in (span.from_tower, span.to_tower)}
+    return [
+        LineNote(tower.x, tower.y, UNHELD, tower.id, 0) for tower in towers if tower.id not in held
+    ]
 
 
 def _is_cable(spans: Sequence[TracedSpan], usual: float, lowest: Mapping[int, float]) -> bool:
@@ -226,7 +231,7 @@ def _conductors(span: TracedSpan, span_id: int, usual: float | None) -> list[Con
 
     wires = sorted(span.wires, key=place)
     own = [wire for wire in wires if not is_cable(wire)]
-    earth = {id(own[number]) for number in _earth_wires(own)}
+    earth = {id(own[number]) for number in earth_wires([wire.catenary for wire in own])}
     found = []
     for number, wire in enumerate(wires):
         curve = wire.catenary
@@ -254,12 +259,13 @@ def _conductors(span: TracedSpan, span_id: int, usual: float | None) -> list[Con
     return found
 
 
-def _earth_wires(wires: Sequence[SpanWire]) -> set[int]:
-    """Numbers of the earth wires: those above full circuits, if they are the highest ones."""
+def earth_wires(wires: Sequence[Catenary]) -> set[int]:
+    """Numbers of the earth wires among those of a span that are no cables: those above full
+    circuits, if they are the highest ones."""
     over = len(wires) % PHASES
     if over == 0 or over > MOST_EARTH_WIRES or len(wires) < PHASES:
         return set()
-    height = [wire.catenary.start[2] + wire.catenary.end[2] for wire in wires]
+    height = [wire.start[2] + wire.end[2] for wire in wires]
     return set(np.argsort(height, kind="stable")[-over:].tolist())
 
 

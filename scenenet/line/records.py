@@ -177,12 +177,14 @@ class SurveyLine:
         conductors: span by span.
         notes: places to look at.
         supports: the towers that are in a line.
+        rejected: conductors that people rejected; they count nowhere else.
     """
 
     spans: tuple[LineSpan, ...]
     conductors: tuple[Conductor, ...]
     notes: tuple[LineNote, ...]
     supports: tuple[Support, ...] = ()
+    rejected: tuple[Conductor, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         return {
@@ -190,6 +192,7 @@ class SurveyLine:
             "conductors": [conductor.to_json() for conductor in self.conductors],
             "notes": [note.to_json() for note in self.notes],
             "supports": [support.to_json() for support in self.supports],
+            "rejected": [conductor.to_json() for conductor in self.rejected],
         }
 
     @classmethod
@@ -200,4 +203,5 @@ class SurveyLine:
             tuple(map(Conductor.from_json, data["conductors"])),
             tuple(map(LineNote.from_json, data["notes"])),
             tuple(map(Support.from_json, data["supports"])),
+            tuple(map(Conductor.from_json, data["rejected"])),
         )

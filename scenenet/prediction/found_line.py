@@ -5,7 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -15,11 +16,13 @@ from scenenet.line.find_line import find_line
 from scenenet.line.notes import EXPECTED, FOUND_AGAIN, PASSED, UNHELD, LineNote
 from scenenet.line.passed import passed_towers
 from scenenet.line.records import SurveyLine
+from scenenet.line.rejected import without_conductors
 from scenenet.line.traced_spans import REACH_M, LineTower
 from scenenet.line.wire_points import WirePoints
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_near
 from scenenet.prediction.surroundings import occupied_voxels
 from scenenet.prediction.work.lattice import groups
+from scenenet.prediction.work.survey_system import SurveySystem
 from scenenet.prediction.work.tile_predictions import TilePredictions
 from scenenet.prediction.work.tiling import TileSpool
 
@@ -48,6 +51,24 @@ class WireSearch:
     tau: float
 
 
+class Rejects(Protocol):
+    """What people decided about conductors."""
+
+    @property
+    def files(self) -> Sequence[Path]:
+        """The files that say it."""
+        ...
+
+    def __call__(self, line: SurveyLine, system: SurveySystem) -> Set[tuple[int, int]]:
+        """The conductors of a survey that were rejected: (``span_id``, ``conductor_id``) of each.
+
+        Args:
+            line: m.
+            system: of the coordinates of the survey.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class FoundLine:
     """The lines of a survey.
@@ -59,6 +80,19 @@ class FoundLine:
 
     line: SurveyLine
     towers: FoundTowers
+
+    def reviewed(self, rejects: Rejects | None, system: SurveySystem) -> FoundLine:
+        """The same without the conductors that people rejected.
+
+        Args:
+            rejects: None if nobody did.
+            system: of the coordinates of the survey.
+        """
+        if rejects is None:
+            return self
+        towers = [_in_metres(tower, system.unit_sizes) for tower in self.towers.towers]
+        line = without_conductors(self.line, towers, rejects(self.line, system))
+        return replace(self, line=line)
 
     def to_json(self) -> dict[str, Any]:
         return {"line": self.line.to_json(), "towers": self.towers.to_json()}

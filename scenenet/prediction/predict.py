@@ -24,7 +24,7 @@ from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.targets import WIRE
 from scenenet.prediction.area_points import WireVoxels
 from scenenet.prediction.found_clearances import find_clearances_in_survey
-from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
+from scenenet.prediction.found_line import FoundLine, Rejects, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch, find_in_survey
 from scenenet.prediction.settings import PredictSettings
 from scenenet.prediction.survey_files import SurveyFiles, look_at
@@ -58,6 +58,7 @@ def predict_survey(
     work: WorkFolder | None = None,
     scheme: ClassScheme | None = None,
     clearance: ClearanceSettings | None = None,
+    rejects: Rejects | None = None,
 ) -> Iterator[SurveyPrediction]:
     """Predict every occupied voxel of a survey and, with a model of towers, find its towers.
 
@@ -81,6 +82,7 @@ def predict_survey(
         scheme: of the class codes in the survey (``use_models``); where lines are found, they say
             what is near the conductors.
         clearance: how the clearances of these lines are measured; None for the defaults.
+        rejects: conductors that people rejected; None for none.
 
     Raises:
         InputError: the survey or a model cannot be used.
@@ -119,6 +121,7 @@ def predict_survey(
         if first.target.is_tower and wires is not None:
             label = f"{survey.given.name}: spans traced"
             lines = _line(folder, wires.search, search, found, label)
+            lines = lines.reviewed(rejects, joined.system)
             line, found = lines.line, lines.towers
             own = clearance or ClearanceSettings()
             clearances = _clearances(joined, folder, lines, wires.search, own, scheme)

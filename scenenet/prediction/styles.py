@@ -85,6 +85,9 @@ STYLES: Mapping[str, str] = {
         size="2.6",
     ),
     "conductors": _style("line", "SimpleLine", line_color="41,98,165,255", line_width="0.4"),
+    "rejected_conductors": _style(
+        "line", "SimpleLine", line_color="120,120,120,255", line_style="dot", line_width="0.3"
+    ),
     "spans": _style(
         "line",
         "SimpleLine",

@@ -22,6 +22,7 @@ from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.pointcloud.copc import write_copc
 from scenenet.prediction.clearance_lists import write_clearance_layers, write_clearances_csv
 from scenenet.prediction.file_status import write_status
+from scenenet.prediction.found_line import Rejects
 from scenenet.prediction.line_lists import (
     write_conductors_csv,
     write_line_layers,
@@ -49,6 +50,7 @@ def predict_to_files(
     code: str | None = None,
     scheme: ClassScheme | None = None,
     clearance: ClearanceSettings | None = None,
+    rejects: Rejects | None = None,
 ) -> PredictionSummary:
     """Predict a survey and write the classified points, the tower list and the summary.
 
@@ -66,6 +68,7 @@ def predict_to_files(
             the version of the package.
         scheme: of the class codes in the survey (``scenenet.prediction.used_models.use_models``).
         clearance: how clearances of lines are measured; None for the defaults.
+        rejects: conductors that people rejected; None for none.
 
     Raises:
         InputError: the survey or a model cannot be used, or ``files`` has tower lists and no model
@@ -85,11 +88,12 @@ def predict_to_files(
         work = None
         if files.work is not None:
             made_by = _made_by(
-                survey, models, settings, detection, code or package_version(), scheme, clearance
-            )
+                survey, models, settings, detection, code or package_version(), scheme, clearance,
+                rejects,
+            )  # fmt: skip
             work = stack.enter_context(resumable(files.work, survey, made_by))
         prediction = stack.enter_context(
-            predict_survey(survey, models, settings, detection, work, scheme, clearance)
+            predict_survey(survey, models, settings, detection, work, scheme, clearance, rejects)
         )
         prediction.warn()
         return _write_all(prediction, files, work)
@@ -176,12 +180,14 @@ def _made_by(
     code: str,
     scheme: ClassScheme | None,
     clearance: ClearanceSettings | None,
+    rejects: Rejects | None,
 ) -> dict[str, Any]:
     """All that decides on the results of a survey besides its files, as JSON holds it."""
     return {
         "models": [fingerprint(path) for path in paths_of(models)],
         "scheme": None if scheme is None else scheme.name,
         "clearance": None if clearance is None else clearance.model_dump(mode="json"),
+        "rejects": [] if rejects is None else [fingerprint(path) for path in rejects.files],
         "settings": settings.model_dump(mode="json"),
         "detection": detection.model_dump(mode="json"),
         "crs": None if survey.crs is None else survey.crs.srs,
@@ -254,6 +260,7 @@ def _line(line: SurveyLine, clearances: SurveyClearances | None) -> dict[str, An
         "conductors": kinds.count("conductor"),
         "earth_wires": kinds.count("earth wire"),
         "cables": kinds.count("cable"),
+        "rejected": len(line.rejected),
         "to_look_at": len(line.notes),
         "positions": AS_FLOWN,
         "clearances": None if clearances is None else clearances.counts(),

@@ -1,4 +1,4 @@
-"""Review files: what people decided about the towers of a list, a row each."""
+"""Review files: what people decided about the towers and conductors of a survey, a row each."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from scenenet.core.errors import InputError
-from scenenet.review.found_list import FoundList
 from scenenet.review.places import NoPlaces, PlaceColumns, in_survey
 from scenenet.review.tables.table import Row, Table, read_table
 
 if TYPE_CHECKING:
     import pyproj
 
+    from scenenet.review.found_list import FoundList
+
 Decision = Literal["accept", "reject", "add", "comment"]
 
 DECISIONS: tuple[Decision, ...] = get_args(Decision)
+
+SPAN, CONDUCTOR = ("span", "span id"), ("conductor", "conductor id")
+"""Names of the columns with the numbers of a conductor."""
 
 LAYER = "review"
 """Layer of a GeoPackage with decisions."""
@@ -36,9 +40,12 @@ class Said:
         row: the row.
         decision: accept, reject or add a tower, or only a comment.
         id: of the tower; None where the row names it by its place.
-        place: x and y in the CRS and the units of the survey; None without coordinates.
+        place: x and y; None without coordinates.
+        crs: system of the place; None for that of the survey.
         base, height: of an added tower, in the units of the survey; None if not given.
         comment, reviewer: empty if not given.
+        span, conductor: numbers of a conductor; a row with the latter is about one.
+        z: elevation of the place of a conductor, in the units of the survey.
     """
 
     row: Row
@@ -49,6 +56,21 @@ class Said:
     height: float | None
     comment: str
     reviewer: str
+    crs: pyproj.CRS | None = None
+    span: int | None = None
+    conductor: int | None = None
+    z: float | None = None
+
+    def in_survey(self, survey: pyproj.CRS | None) -> Said:
+        """The same with its place in the system of the survey.
+
+        Raises:
+            InputError: it cannot be there.
+        """
+        if self.place is None:
+            return self
+        [(x, y)] = in_survey([self.row], [self.place], self.crs, survey).tolist()
+        return replace(self, place=(x, y), crs=None)
 
 
 @dataclass(frozen=True)
@@ -70,11 +92,37 @@ class Statements:
             self.said + other.said, self.errors + other.errors, self.undecided + other.undecided
         )
 
+    @property
+    def of_towers(self) -> tuple[Said, ...]:
+        """What is said about towers."""
+        return tuple(each for each in self.said if each.conductor is None)
+
+    @property
+    def of_conductors(self) -> tuple[Said, ...]:
+        """What is said about conductors."""
+        return tuple(each for each in self.said if each.conductor is not None)
+
+    def in_survey(self, survey: pyproj.CRS | None) -> Statements:
+        """The same with all places in the system of the survey; None if that is not known."""
+        said: list[Said] = []
+        errors = list(self.errors)
+        for each in self.said:
+            try:
+                said.append(each.in_survey(survey))
+            except InputError as error:
+                errors.append(error)
+        return replace(self, said=tuple(said), errors=tuple(errors))
+
 
 def read_decisions(
     paths: Sequence[Path], found: FoundList, crs: pyproj.CRS | None = None
 ) -> Statements:
-    """What review files say about the towers of a list.
+    """What review files say about the survey of a list; arguments and errors as ``read_rows``."""
+    return read_rows(paths, crs).in_survey(found.crs)
+
+
+def read_rows(paths: Sequence[Path], crs: pyproj.CRS | None = None) -> Statements:
+    """What review files say, with places as they are in the files.
 
     Args:
         paths: CSV files, or GeoPackages with a layer ``LAYER``.
@@ -85,11 +133,22 @@ def read_decisions(
     """
     together = Statements((), (), 0)
     for path in paths:
-        together += _read_file(path, found, crs)
+        together += _read_file(path, crs)
     return together
 
 
-def _read_file(path: Path, found: FoundList, crs: pyproj.CRS | None) -> Statements:
+def refuse(errors: Sequence[InputError]) -> None:
+    """Refuse review files with errors in their rows.
+
+    Raises:
+        InputError: there is one; all of them are named.
+    """
+    if errors:
+        listed = "".join(f"\n  {error}" for error in errors)
+        raise InputError(f"{len(errors)} decisions cannot be used, so none was applied:{listed}")
+
+
+def _read_file(path: Path, crs: pyproj.CRS | None) -> Statements:
     table = read_table(path, LAYER if path.suffix.lower() == ".gpkg" else None)
     columns = _Columns.of(table, crs)
     said: list[Said] = []
@@ -101,18 +160,10 @@ def _read_file(path: Path, found: FoundList, crs: pyproj.CRS | None) -> Statemen
             if read is None:
                 undecided += 1
             else:
-                said.append(_in_survey(read, columns, found))
+                said.append(read)
         except InputError as error:
             errors.append(error)
     return Statements(tuple(said), tuple(errors), undecided)
-
-
-def _in_survey(said: Said, columns: _Columns, found: FoundList) -> Said:
-    """The same with its place in the system of the survey."""
-    if said.place is None or columns.places is None:
-        return said
-    [(x, y)] = in_survey([said.row], [said.place], columns.places.crs, found.crs).tolist()
-    return replace(said, place=(x, y))
 
 
 @dataclass(frozen=True)
@@ -126,6 +177,9 @@ class _Columns:
     height: str | None
     comment: str | None
     reviewer: str | None
+    span: str | None
+    conductor: str | None
+    z: str | None
 
     @classmethod
     def of(cls, table: Table, crs: pyproj.CRS | None) -> _Columns:
@@ -144,10 +198,10 @@ class _Columns:
             places = PlaceColumns.of(table, crs=crs)
         except NoPlaces:
             places = None
-        if id is None and places is None:
+        if id is None and places is None and table.column(CONDUCTOR) is None:
             raise table.error(f"there is no column id, and no x and y, among {listed}", remedy)
-        others = (table.column((name,)) for name in ("base", "height", "comment", "reviewer"))
-        return cls(decision, id, places, *others)
+        names = ("base",), ("height",), ("comment",), ("reviewer",), SPAN, CONDUCTOR, ("z",)
+        return cls(decision, id, places, *map(table.column, names))
 
     def said(self, row: Row) -> Said | None:
         """What a row says, with its place as it is in the file; None if it says nothing.
@@ -172,4 +226,8 @@ class _Columns:
             height=row.number(self.height),
             comment=comment,
             reviewer=row.text(self.reviewer),
+            crs=None if self.places is None else self.places.crs,
+            span=row.whole_number(self.span),
+            conductor=row.whole_number(self.conductor),
+            z=row.number(self.z),
         )

@@ -13,8 +13,9 @@ from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
 from scenenet.detection.survey_tower import CONTRIBUTION, row_types
 from scenenet.line.notes import LineNote
-from scenenet.prediction.line_lists import NOTES
+from scenenet.prediction.line_lists import CONDUCTORS, NOTES, REJECTED
 from scenenet.prediction.summary import SUMMARY
+from scenenet.review.listed_conductor import ListedConductor
 from scenenet.review.tables.layer import layers_of
 from scenenet.review.tables.table import Row, Table, read_table
 
@@ -64,6 +65,8 @@ class FoundList:
         classified: whether the prediction gave towers a class code.
         notes: places that the line between the towers says something of, in the units of the
             survey; none where no line was looked for.
+        conductors: of the line, those last that the prediction left out because people had rejected
+            them.
     """
 
     path: Path
@@ -78,6 +81,7 @@ class FoundList:
     voxel_size: float | None = None
     classified: bool = False
     notes: tuple[LineNote, ...] = ()
+    conductors: tuple[ListedConductor, ...] = ()
 
     @property
     def places(self) -> np.ndarray:
@@ -119,7 +123,9 @@ def find_list(given: str | Path) -> FoundList:
     facts = _summary(path.with_name(name + SUMMARY))
     return FoundList(
         path, name, columns, towers, crs=table.crs or crs or _crs(facts.get("crs")),
-        coverage=coverage, notes=_notes(covered), **_of_summary(facts),
+        coverage=coverage, notes=_notes(covered),
+        conductors=(*_conductors(covered, CONDUCTORS), *_conductors(covered, REJECTED)),
+        **_of_summary(facts),
     )  # fmt: skip
 
 
@@ -217,6 +223,25 @@ def _notes(package: Path) -> tuple[LineNote, ...]:
     facts, _, _, values = pyogrio.raw.read(package, layer=NOTES, read_geometry=False)
     rows = zip(*(column.tolist() for column in values), strict=True)
     return tuple(LineNote(**dict(zip(facts["fields"], row, strict=True))) for row in rows)
+
+
+def _conductors(package: Path, layer: str) -> list[ListedConductor]:
+    """The rows of a layer with conductors; none without one."""
+    import pyogrio
+    import shapely
+
+    if layer not in _layers(package):
+        return []
+    facts, _, geometry, values = pyogrio.raw.read(package, layer=layer)
+    found = []
+    columns = [column.tolist() for column in values]
+    for shape, *row in zip(shapely.from_wkb(geometry), *columns, strict=True):
+        own = dict(zip(facts["fields"], row, strict=True))
+        xyz = shapely.get_coordinates(shape, include_z=True)
+        found.append(
+            ListedConductor(own["span_id"], own["conductor_id"], xyz, own, layer == REJECTED)
+        )
+    return found
 
 
 def _summary(path: Path) -> Mapping[str, Any]:

@@ -1,9 +1,9 @@
-"""Decisions merged with the towers that were found."""
+"""Decisions merged with the towers and conductors that were found."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence, Set
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,9 @@ from scenenet.core.errors import InputError
 from scenenet.detection.distinct import APART_M
 from scenenet.detection.tower_ids import EAST, NORTH, tower_ids
 from scenenet.metrics.tower_matching import HIT_DISTANCE_M
-from scenenet.review.decisions import Decision, Said, Statements
+from scenenet.review.about import About
+from scenenet.review.conductors import ConductorReview, merge_conductors
+from scenenet.review.decisions import Said, Statements
 from scenenet.review.found_list import FoundList, ListedTower
 from scenenet.review.reviewed_tower import Decided, ReviewedTower
 
@@ -23,7 +25,8 @@ class Review:
 
     Attributes:
         towers: of the list, in its order, then those that were added.
-        unmatched: rows that name a place where no tower was found, as sentences.
+        conductors: of the line; None where the list has none.
+        unmatched: rows that name a place where no tower or conductor was found, as sentences.
         warnings: what looks wrong, as sentences.
         undecided: number of rows that say nothing.
     """
@@ -32,6 +35,7 @@ class Review:
     unmatched: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     undecided: int = 0
+    conductors: ConductorReview | None = None
 
     def decided(self, *decisions: Decided) -> list[ReviewedTower]:
         """The towers with one of these decisions."""
@@ -54,35 +58,6 @@ class Review:
         }
 
 
-@dataclass
-class _About:
-    """What was said about one tower."""
-
-    said: list[Said] = field(default_factory=list)
-    errors: list[InputError] = field(default_factory=list)
-
-    def add(self, said: Said) -> None:
-        other = next((o for o in self.said if {o.decision, said.decision} == _OPPOSITE), None)
-        if other is not None:
-            self.errors.append(
-                said.row.error(
-                    f"it says {said.decision}, and {other.row.file.name}, {other.row.place} says "
-                    f"{other.decision} of the same tower",
-                    "Delete one of the two rows",
-                )
-            )
-        self.said.append(said)
-
-    @property
-    def decision(self) -> Decided:
-        words: set[Decision] = {said.decision for said in self.said}
-        return "rejected" if "reject" in words else "accepted" if "accept" in words else _OPEN
-
-
-_OPPOSITE = {"accept", "reject"}
-_OPEN: Decided = "not reviewed"
-
-
 def merge(found: FoundList, statements: Statements) -> tuple[Review, list[InputError]]:
     """Merge decisions with a tower list.
 
@@ -90,14 +65,14 @@ def merge(found: FoundList, statements: Statements) -> tuple[Review, list[InputE
         statements: of ``read_decisions``.
 
     Returns:
-        the review, and the errors of rows that name no tower, contradict another row, or add a
+        the review, and the errors of rows that name nothing, contradict another row, or add a
         tower where one stands. With an error the review is not complete.
     """
     errors = list(statements.errors)
     known = _Towers(found)
-    about: dict[int, _About] = {}
+    about: dict[int, About] = {}
     unmatched: list[str] = []
-    for said in statements.said:
+    for said in statements.of_towers:
         if said.decision == "add":
             continue
         try:
@@ -108,13 +83,13 @@ def merge(found: FoundList, statements: Statements) -> tuple[Review, list[InputE
         if tower is None:
             unmatched.append(_no_tower(said))
         else:
-            about.setdefault(tower.id, _About()).add(said)
+            about.setdefault(tower.id, About()).add(said)
     errors += [error for each in about.values() for error in each.errors]
-    towers = [_reviewed(tower, about.get(tower.id, _About())) for tower in found.towers]
+    towers = [_reviewed(tower, about.get(tower.id, About())) for tower in found.towers]
     rejected = {tower.id for tower in towers if tower.decision == "rejected"}
     taken = {tower.id for tower in towers}
     added: list[ReviewedTower] = []
-    for said in statements.said:
+    for said in statements.of_towers:
         if said.decision != "add":
             continue
         try:
@@ -123,8 +98,15 @@ def merge(found: FoundList, statements: Statements) -> tuple[Review, list[InputE
             taken.add(added[-1].id)
         except InputError as error:
             errors.append(error)
-    warnings = _outside(added, found)
-    review = Review((*towers, *added), tuple(unmatched), tuple(warnings), statements.undecided)
+    conductors = None
+    if found.conductors or statements.of_conductors:
+        conductors, faults = merge_conductors(found.conductors, statements, found.unit_sizes)
+        errors += faults
+        unmatched += conductors.unmatched
+    review = Review(
+        (*towers, *added), tuple(unmatched), tuple(_outside(added, found)), statements.undecided,
+        conductors,
+    )  # fmt: skip
     return review, errors
 
 
@@ -186,7 +168,7 @@ def _no_tower(said: Said) -> str:
     )
 
 
-def _reviewed(tower: ListedTower, about: _About) -> ReviewedTower:
+def _reviewed(tower: ListedTower, about: About) -> ReviewedTower:
     return ReviewedTower(
         tower.id,
         tower.x,
@@ -194,15 +176,8 @@ def _reviewed(tower: ListedTower, about: _About) -> ReviewedTower:
         tower.values.get("base"),
         tower.values,
         about.decision,
-        *_texts(about.said),
+        *about.texts,
     )
-
-
-def _texts(said: Sequence[Said]) -> tuple[str, str]:
-    """The comments and the reviewers, each once."""
-    comments = dict.fromkeys(each.comment for each in said if each.comment)
-    people = dict.fromkeys(each.reviewer for each in said if each.reviewer)
-    return " | ".join(comments), " | ".join(people)
 
 
 def _require_free(

@@ -6,8 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenenet.core.errors import InputError
-from scenenet.review.decisions import read_decisions
+from scenenet.review.decisions import read_decisions, refuse
 from scenenet.review.found_list import find_list
 from scenenet.review.merge import merge
 from scenenet.review.reviewed_files import ReviewedFiles, write_review
@@ -29,7 +28,5 @@ def review_survey(towers: str | Path, decisions: Sequence[str | Path], folder: s
     review, errors = merge(found, read_decisions(paths, found))
     for text in (*review.unmatched, *review.warnings):
         print(f"warning: {text}", file=sys.stderr)
-    if errors:
-        listed = "".join(f"\n  {error}" for error in errors)
-        raise InputError(f"{len(errors)} decisions cannot be used, so none was applied:{listed}")
+    refuse(errors)
     write_review(review, found, paths, ReviewedFiles.of(found, Path(folder), None))

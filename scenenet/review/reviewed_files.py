@@ -7,14 +7,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenenet.line.records import CONDUCTOR_COLUMNS
 from scenenet.pointcloud.class_schemes import ClassScheme
+from scenenet.prediction import line_lists
 from scenenet.prediction.styles import STYLES
 from scenenet.prediction.tower_lists import (
     add_styles,
+    arrays,
     write_csv,
     write_geojson,
+    write_layer,
     write_tower_layer,
 )
+from scenenet.review.conductors import ConductorReview, ReviewedConductor
 from scenenet.review.found_list import REVIEWED, FoundList
 from scenenet.review.labels.labelled_survey import LabelFiles, write_labels
 from scenenet.review.merge import Review
@@ -46,7 +51,7 @@ class ReviewedFiles:
 
     Attributes:
         table, geojson, geopackage: the towers that were not rejected; the GeoPackage has the
-            others in a layer ``REJECTED``.
+            others in a layer ``REJECTED``, and the conductors of the line in two more.
         rejected: the others (CSV).
         record: the result as JSON.
         labelling: of the survey; None for no labels.
@@ -96,6 +101,7 @@ def write_review(
         "found": str(found.path),
         "decisions": [str(path) for path in decisions],
         "counts": review.counts(),
+        "conductors": None if review.conductors is None else review.conductors.counts(),
         "unmatched": list(review.unmatched),
         "undecided_rows": review.undecided,
         "warnings": list(review.warnings),
@@ -130,4 +136,23 @@ def _write_lists(
     package = partial[files.geopackage]
     write_tower_layer(package, "towers", kept, columns, found.crs)
     write_tower_layer(package, REJECTED, rejected, columns, found.crs)
-    add_styles(package, ["towers"], STYLES)
+    layers = ["towers"]
+    if review.conductors is not None:
+        layers += _write_conductors(review.conductors, found, package)
+    add_styles(package, layers, STYLES)
+
+
+def _write_conductors(review: ConductorReview, found: FoundList, package: Path) -> list[str]:
+    """Add the layers of the conductors that were not rejected, and of the others; their names."""
+    import shapely
+
+    columns = {c.name: c.type for c in CONDUCTOR_COLUMNS} | REVIEW_COLUMNS
+    parts: dict[str, list[ReviewedConductor]] = {
+        line_lists.CONDUCTORS: review.decided("accepted", "not reviewed"),
+        line_lists.REJECTED: review.decided("rejected"),
+    }
+    for name, rows in parts.items():
+        values = {c: [row.to_row().get(c) for row in rows] for c in columns}
+        along = [shapely.LineString(row.listed.xyz) for row in rows]
+        write_layer(package, name, "LineString Z", along, arrays(values, columns), found.crs)
+    return list(parts)

@@ -255,3 +255,30 @@ def test_a_voltage_without_limits_is_refused(corridor):
     xyz, codes, line = corridor
     with pytest.raises(InputError, match="750 kV"):
         find_clearances(line, within(xyz, codes), ClearanceSettings(voltage=750), EDP)
+
+
+def test_what_was_taken_for_a_conductor_is_an_obstacle_once_it_is_rejected(corridor):
+    xyz, codes, line = corridor
+    gone = line.conductors[0]
+    others = tuple(wire for wire in line.conductors if wire is not gone)
+
+    def points(area):
+        found = within(xyz, codes)(area)
+        # The model of wires is sure of all conductors.
+        return replace(found, wire=found.codes == CONDUCTOR, codes=None)
+
+    untraced = find_clearances(replace(line, conductors=others), points, SETTINGS)
+    rejected = replace(line, conductors=others, rejected=(gone,))
+    found = find_clearances(rejected, points, SETTINGS)
+    assert (gone.span_id, gone.conductor_id) not in {
+        (place.span_id, place.conductor_id) for place in found.places
+    }
+    own = gone.catenary
+
+    def on_it(clearances):
+        places = [p for p in clearances.dangers if p.span_id == gone.span_id]
+        at = np.array([(p.x, p.y, p.z) for p in places]).reshape(-1, 3)
+        return (np.hypot(*own.residuals(at)) < 0.2).sum() if len(at) else 0
+
+    assert on_it(untraced) == 0
+    assert on_it(found) > 0

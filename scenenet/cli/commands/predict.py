@@ -31,6 +31,7 @@ from scenenet.cli.predicted_surveys import (
     clearance_settings,
     ready_surveys,
     refuse_without_lines,
+    rejected_conductors,
     replaceable_codes,
 )
 from scenenet.models.packaged import packaged_model
@@ -111,6 +112,15 @@ Sags = Annotated[
         f"columns {columns_of_table(SpanSag)}.  [default: as flown]",
     ),
 ]
+Decisions = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--decisions",
+        metavar="FILE",
+        help="Review file (scenenet review): conductors that it rejects are left out. May be "
+        "repeated; for one survey.",
+    ),
+]
 Copc = Annotated[
     bool,
     typer.Option(
@@ -135,6 +145,7 @@ def command(
     voltage: Voltage = None,
     limits: Limits = None,
     sags: Sags = None,
+    decisions: Decisions = None,
     copc: Copc = False,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -172,6 +183,10 @@ def command(
     are closer than the limits. NAME.gpkg then has the layers clearances,
     clearance_profile and fall_trees.
 
+    --decisions leaves conductors out that people rejected in a review file: of all of these files,
+    of the page and of the points. The layer rejected_conductors has them. What was taken for one
+    counts as an obstacle then.
+
     NAME.html: a page with a map, the list of the towers, and each tower in plan and profile with
     its reasons and what to check. It needs no other file and no network.
 
@@ -203,6 +218,9 @@ def command(
     system = coordinate_system(crs)
     if copc:
         require_pdal()
+    if decisions and len(surveys) > 1:
+        raise typer.BadParameter("belongs to one survey", param_hint="--decisions")
+    rejects = rejected_conductors(decisions)
     clearance = clearance_settings(voltage, limits, sags)
     failures = Failures()
     named = failures.look_at(surveys, lambda given: SurveyFiles.of(given, system))
@@ -210,7 +228,8 @@ def command(
     if named and (line or model != [packaged_model()]):  # it loads torch, which takes seconds
         model, towers, lines = chosen_models(model, line, settings, scheme)
     if named and not lines:
-        refuse_without_lines({"--line": line, "--voltage": voltage, "--sags": sags})
+        needing = {"--voltage": voltage, "--sags": sags, "--decisions": decisions}
+        refuse_without_lines({"--line": line, **needing})
     results = {
         given: PredictionFiles.of(survey, out, copc=copc, towers=towers, line=lines)
         for given, survey in named.items()
@@ -223,8 +242,9 @@ def command(
     for given in ready:
         with failures.collect():
             summary = writers.predict_to_files(
-                named[given], model, results[given], settings, detection, code, scheme, clearance
-            )
+                named[given], model, results[given], settings, detection, code, scheme, clearance,
+                rejects,
+            )  # fmt: skip
             summaries.append(summary.to_json())
             for file in summary.files:
                 if file["error"]:

@@ -83,15 +83,18 @@ def command(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Merge what people decided about the towers of a survey.
+    """Merge what people decided about the towers and conductors of a survey.
 
     A review file has a row for each decision: accept, reject, add or comment, with the id of the
     tower or its x and y, and a comment, a reviewer, and for an added tower its base and height.
-    --template writes one with every tower, the doubtful ones first, each with the reasons.
+    --template writes one with every tower, the doubtful ones first, each with the reasons. Where
+    a line was found it has every conductor too, to accept, reject or comment on.
 
     NAME.reviewed.csv, .geojson and .gpkg have the towers that were not rejected, with their
     decisions. NAME.rejected.csv and the layer rejected have the others. NAME.reviewed.json is the
-    record.
+    record. NAME.reviewed.gpkg has the conductors in the layers conductors and
+    rejected_conductors. To leave rejected conductors out of spans, clearances and the page,
+    predict the survey again with --decisions.
 
     --labels writes a copy of the points beside the list in which the points of accepted and added
     towers are labelled tower, and those of rejected ones are not.
@@ -133,6 +136,7 @@ def _template(towers: FoundList, template: Path, overwrite: bool, as_json: bool)
     result = {
         "template": str(template),
         "towers": [{"id": each.tower.id, "doubts": list(each.reasons)} for each in doubted],
+        "conductors": len(towers.conductors),
     }
     show(result, as_json, _template_lines)
 
@@ -140,7 +144,10 @@ def _template(towers: FoundList, template: Path, overwrite: bool, as_json: bool)
 def _template_lines(result: dict[str, Any]) -> list[str]:
     towers = result["towers"]
     doubted = sum(bool(tower["doubts"]) for tower in towers)
-    return [f"{result['template']}: {len(towers)} towers to review, {doubted} of them doubtful"]
+    wires = f", and {result['conductors']} conductors" if result["conductors"] else ""
+    return [
+        f"{result['template']}: {len(towers)} towers to review, {doubted} of them doubtful{wires}"
+    ]
 
 
 def _labelling(
@@ -187,7 +194,14 @@ def _merge(
     failures.end()
     for text in (*review.unmatched, *review.warnings):
         print(f"warning: {text}", file=sys.stderr)
-    show(write_review(review, towers, decisions, files), as_json, _lines)
+    result = write_review(review, towers, decisions, files)
+    if review.conductors is not None and (named := review.conductors.rejected()):
+        print(
+            f"rejected: {named}. To leave them out of spans, clearances and the page, predict the "
+            "survey again with --decisions",
+            file=sys.stderr,
+        )
+    show(result, as_json, _lines)
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
@@ -197,8 +211,14 @@ def _lines(result: dict[str, Any]) -> list[str]:
         f"rejected, {counts['not_reviewed']} not reviewed; {counts['added']} added, "
         f"{counts['comments']} with a comment"
     ]
+    if (wires := result["conductors"]) is not None:
+        lines.append(
+            f"{wires['found']} conductors found: {wires['accepted']} accepted, "
+            f"{wires['rejected']} rejected, {wires['not_reviewed']} not reviewed, "
+            f"{wires['comments']} with a comment"
+        )
     if result["unmatched"]:
-        lines.append(f"{len(result['unmatched'])} rows match no tower")
+        lines.append(f"{len(result['unmatched'])} rows match no tower or conductor")
     if (labels := result["labels"]) is not None:
         lines.append(
             f"{labels['tower_points']:,} points labelled tower in {', '.join(labels['files'])}"

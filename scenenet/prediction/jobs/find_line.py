@@ -11,7 +11,7 @@ from scenenet.core.files import read_json, write_json
 from scenenet.detection.settings import DetectionSettings
 from scenenet.pointcloud.class_schemes import ClassScheme
 from scenenet.prediction.found_clearances import WireVoxels, find_clearances_in_survey
-from scenenet.prediction.found_line import FoundLine, WireSearch, find_line_in_survey
+from scenenet.prediction.found_line import FoundLine, Rejects, WireSearch, find_line_in_survey
 from scenenet.prediction.found_towers import FoundTowers, TowerSearch
 from scenenet.prediction.jobs.joined import joined_predictions, joined_work, write_near
 from scenenet.prediction.survey_files import SurveyFiles
@@ -31,6 +31,7 @@ def find_line_of(
     detection: DetectionSettings,
     line: str | Path,
     near: str | Path,
+    rejects: Rejects | None = None,
 ) -> None:
     """Find the lines between the towers of a survey, and the towers that they ask for.
 
@@ -41,6 +42,7 @@ def find_line_of(
         line: file to write (``FoundLine``).
         near: folder to write, with a file for each file of the survey that can be used: the towers
             and conductors that reach into it. It stays the same to the byte while these do.
+        rejects: conductors that people rejected; None for none.
 
     Raises:
         InputError: no file can be used.
@@ -52,7 +54,7 @@ def find_line_of(
         TowerSearch(joined.spool, tiles, joined.system.unit_sizes, tiles.tau, detection),
         FoundTowers.from_json(read_json(towers)),
         f"{survey.name}: spans traced",
-    )
+    ).reviewed(rejects, joined.system)
     write_json(line, found.to_json())
     lattice = joined.spool.lattice
     reached = [(each, columns_reached(each, lattice)) for each in found.line.conductors]

@@ -91,10 +91,9 @@ def rejected_conductors(decisions: Sequence[Path] | None) -> RejectedConductors 
     """
     from scenenet.review.rejected_conductors import RejectedConductors
 
-    if not decisions:
-        return None
-    rejects = RejectedConductors(tuple(decisions))
-    rejects.check()
+    rejects = RejectedConductors.of(decisions or ())
+    if rejects is not None:
+        rejects.check()
     return rejects
 
 

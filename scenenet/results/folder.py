@@ -253,10 +253,14 @@ class Results:
             read_table(clearances) if read.line and read.line["clearances"] else None,
         )
 
-    def review_counts(self, survey: str) -> Mapping[str, int] | None:
-        """Number of towers of a survey with each decision; None without a review."""
+    def review_counts(self, survey: str) -> Mapping[str, Mapping[str, int]]:
+        """Number of ``towers`` of a survey with each decision, and of ``conductors`` where it has a
+        line; empty without a review."""
         record = self._if_there("review", f"{survey}/{survey}.reviewed.json")
-        return None if record is None else record["counts"]
+        if record is None:
+            return {}
+        conductors = record["conductors"]
+        return {"towers": record["counts"]} | ({"conductors": conductors} if conductors else {})
 
     def provenances(self) -> list[tuple[str, Mapping[str, Any]]]:
         """Every provenance record with its path in the result folder, sorted.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal, get_args
 
 from scenenet.core.errors import InputError
+from scenenet.core.files import digest
 from scenenet.review.places import NoPlaces, PlaceColumns, in_survey
 from scenenet.review.tables.table import Row, Table, read_table
 
@@ -135,6 +136,21 @@ def read_rows(paths: Sequence[Path], crs: pyproj.CRS | None = None) -> Statement
     for path in paths:
         together += _read_file(path, crs)
     return together
+
+
+def about_conductors(path: Path) -> str:
+    """A digest of what a review file decides about conductors; empty if that is nothing, or if the
+    file cannot be read. Comments, and what it says of towers, do not change it."""
+    try:
+        said = read_rows([path]).of_conductors
+    except InputError:
+        return ""
+    decided = [
+        (each.decision, each.span, each.conductor, each.place, each.z, str(each.crs))
+        for each in said
+        if each.decision != "comment"
+    ]
+    return digest(decided) if decided else ""
 
 
 def refuse(errors: Sequence[InputError]) -> None:

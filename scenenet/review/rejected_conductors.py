@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Set
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +26,12 @@ class RejectedConductors:
     """
 
     files: tuple[Path, ...]
+
+    @classmethod
+    def of(cls, files: Iterable[str | Path]) -> RejectedConductors | None:
+        """Those of review files; None without a file."""
+        paths = tuple(map(Path, files))
+        return cls(paths) if paths else None
 
     def check(self) -> None:
         """Look at the files before a survey is predicted.

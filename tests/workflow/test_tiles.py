@@ -24,7 +24,7 @@ pytestmark = pytest.mark.workflow
 ROW = "results/predict/{0}"
 STAGES = ("read_tile", "predict_tile", "observe_tile", "find_towers", "conductors", "clearances",
           "write_tile", "survey_lists")  # fmt: skip
-RULES = (*STAGES, "predict", "voxel_size", "survey_complete")
+RULES = (*STAGES, "predict", "voxel_size", "survey_complete", "review")
 DONE = re.compile(r"^Finished jobid: \d+ \(Rule: (\w+)\)", re.MULTILINE)
 UTM = pyproj.CRS(32629)
 
@@ -149,6 +149,43 @@ def test_a_new_tile_makes_itself_its_neighbours_and_the_list(first, scene):
     assert len((written.parent / "tiles.towers.csv").read_text().splitlines()) == 1 + 5
     code, jobs, shown = run(project, ROW.format("tiles/complete.json"))
     assert (code, jobs) == (0, {})
+
+
+def test_a_rejected_conductor_writes_its_tiles_and_no_others(first):
+    project = first[0]
+    folder = project.results / "predict/tiles"
+
+    def spans() -> list[str]:
+        with (folder / "tiles.spans.csv").open(newline="") as stream:
+            return [row["span_id"] for row in csv.DictReader(stream)]
+
+    before = spans()
+    reviews = project.folder / "reviews"
+    reviews.mkdir()
+    decisions = reviews / "tiles.csv"
+    decisions.write_text(f"span,conductor,decision\n{before[0]},1,reject\n")
+    code, jobs, shown = run(project, ROW.format("tiles/complete.json"))
+    assert code == 0, shown
+    assert not jobs.keys() & {"read_tile", "predict_tile", "observe_tile", "find_towers"}
+    assert jobs["conductors"] == jobs["clearances"] == jobs["survey_lists"] == 1
+    names = set(re.findall(r"Writing tile (.*) of tiles", shown))
+    assert "a 1" in names and not {"b", "c"} & names
+    assert spans() == before[1:]
+    written = np.concatenate([laspy.read(p).span_id for p in (folder / "tiles").glob("*.laz")])
+    assert {str(number) for number in written} == {"0", *before[1:]}
+    # The decision stays valid, and what is said of towers changes no prediction.
+    decisions.write_text(decisions.read_text() + ",,comment\n")
+    record = "results/review/tiles/tiles.reviewed.json"
+    code, jobs, shown = run(project, record, ROW.format("tiles/complete.json"))
+    assert (code, jobs) == (1, {}), shown  # a comment on nothing
+    decisions.write_text(f"span,conductor,decision,comment\n{before[0]},1,reject,twigs\n")
+    code, jobs, shown = run(project, record, ROW.format("tiles/complete.json"))
+    assert (code, jobs) == (0, {"review": 1}), shown
+    counts = json.loads((project.folder / record).read_text())["conductors"]
+    assert (counts["found"], counts["rejected"], counts["comments"]) == (len(before), 1, 1)
+    decisions.unlink()
+    code, jobs, shown = run(project, ROW.format("tiles/complete.json"))
+    assert code == 0 and spans() == before, shown
 
 
 def test_a_tower_at_a_seam_that_changes_writes_the_tiles_that_it_reaches_into(first, scene):

@@ -21,6 +21,7 @@ from scenenet.core.errors import InputError
 from scenenet.figures import CROP_RANKS
 from scenenet.core.files import digest
 from scenenet.core.provenance import fingerprint
+from scenenet.review.decisions import about_conductors
 from scenenet.results.tables import print_scores
 from scenenet.config.read_surveys import read_surveys
 from scenenet.config.tile_plan import NEIGHBOURS_M, HeaderCache, plan_tiles
@@ -203,6 +204,18 @@ def classes_of(survey):
     return {**scheme_of(survey), "clearance": SETTINGS["clearance"]}
 
 
+def rejecting(w):
+    """The review files that decide about conductors of a survey. They are known by what they say."""
+    return [ancient(local(path)) for path in REJECTING.get(w.survey, {})]
+
+
+def rejects_of(survey):
+    """What review files decide about conductors, for the parameters of the jobs that leave those out
+    that are rejected; without such a decision, nothing."""
+    said = list(REJECTING.get(survey, {}).values())
+    return {"rejects": said} if said else {}
+
+
 def plans_of_tiles():
     """The tiles of each survey that has several files. Their headers are looked at once."""
     cache = HeaderCache(".snakemake/scenenet-tiles.json")
@@ -249,6 +262,12 @@ TILED = sorted(PLANS)
 WHOLE = [survey for survey in NEW if survey not in PLANS]
 # New survey -> the files with what people decided about its towers.
 REVIEWS = find_reviews(settings, NEW, ".", warn_once)
+# New survey -> those of them that decide about conductors, each with a digest of what it says.
+REJECTING = {
+    survey: {path: said for path in paths if (said := about_conductors(Path(path)))}
+    for survey, paths in REVIEWS.items()
+    if settings.finds_lines()
+}
 EXPERIMENTS = settings.experiments()
 CROSS_VALIDATED = {
     **{model.name: model.model_dump(mode="json") for model in settings.crossed_models()},

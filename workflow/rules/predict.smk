@@ -7,6 +7,7 @@ rule predict:
         survey=lambda w: source(w.survey),
         model=champion_file(settings.predict.model),
         observers=observer_files(),
+        decisions=rejecting,
     output:
         **line_tables(),
         points=f"{R}/predict/{{survey}}/{{survey}}.laz",
@@ -48,6 +49,7 @@ rule predict:
             input={"survey": source_print(w.survey)},
             **given_system(w.survey),
             **classes_of(w.survey),
+            **rejects_of(w.survey),
         ),
     message:
         "Classifying {wildcards.survey}"

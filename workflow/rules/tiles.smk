@@ -209,6 +209,7 @@ if settings.finds_lines():
             predictions=work_files("predictions"),
             wires=observed_tiles(WIRE_OBSERVER),
             towers=f"{R}/predict/{{survey}}/work/towers.json",
+            decisions=rejecting,
         output:
             line=f"{R}/predict/{{survey}}/work/line.json",
             near=directory(f"{R}/predict/{{survey}}/near_line"),
@@ -226,7 +227,10 @@ if settings.finds_lines():
             runtime=480,
         params:
             job=lambda w: job(
-                "conductors", SETTINGS["detection"], survey=PLANS[w.survey].survey.to_json()
+                "conductors",
+                SETTINGS["detection"],
+                survey=PLANS[w.survey].survey.to_json(),
+                **rejects_of(w.survey),
             ),
         message:
             "Finding the spans and conductors of {wildcards.survey}"

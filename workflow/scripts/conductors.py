@@ -7,6 +7,7 @@ def conductors(job: _job.Job) -> None:
     from scenenet.detection.settings import DetectionSettings
     from scenenet.prediction.jobs.find_line import find_line_of
     from scenenet.prediction.survey_files import SurveyFiles
+    from scenenet.review.rejected_conductors import RejectedConductors
 
     find_line_of(
         SurveyFiles.from_json(job.identity["survey"]),
@@ -17,6 +18,7 @@ def conductors(job: _job.Job) -> None:
         DetectionSettings(**job.settings),
         job.output.line,
         job.output.near,
+        RejectedConductors.of(job.input.decisions),
     )
 
 

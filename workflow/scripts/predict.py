@@ -15,6 +15,7 @@ def predict(job: _job.Job) -> None:
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles
     from scenenet.prediction.writers import predict_to_files
+    from scenenet.review.rejected_conductors import RejectedConductors
 
     survey, output = Path(job.input.survey), job.output
     given, codes = job.identity.get("crs"), job.identity.get("codes")
@@ -35,6 +36,7 @@ def predict(job: _job.Job) -> None:
         DetectionSettings(**job.identity["detection"]),
         scheme=None if codes is None else class_scheme(codes),
         clearance=None if codes is None else ClearanceSettings(**job.identity["clearance"]),
+        rejects=RejectedConductors.of(job.input.decisions),
     )
 
 

@@ -87,13 +87,14 @@ def predictions(context: ReportContext) -> Section | None:
     return Section("predictions", "Classified surveys", [note, *blocks])
 
 
-def _reviewed(counts: Mapping[str, int] | None) -> list[tuple[str, str]]:
-    """What people decided about the towers of a survey; nothing without a review."""
-    if counts is None:
-        return []
+def _reviewed(counts: Mapping[str, Mapping[str, int]]) -> list[tuple[str, str]]:
+    """What people decided about the towers and conductors of a survey; nothing without a review."""
     decided = ("accepted", "rejected", "added", "not_reviewed")
-    said = ", ".join(f"{counts[name]} {name.replace('_', ' ')}" for name in decided)
-    return [("review", said)]
+    facts = []
+    for what, numbers in counts.items():
+        said = (f"{numbers[n]} {n.replace('_', ' ')}" for n in decided if n in numbers)
+        facts.append((f"review of {what}", ", ".join(said)))
+    return facts
 
 
 def _not_predicted(survey: str, summary: PredictionSummary) -> list[Block]:

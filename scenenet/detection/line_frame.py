@@ -38,14 +38,21 @@ def rise(s: np.ndarray, t: np.ndarray, along: np.ndarray, ground: Ground) -> np.
     return np.asarray(s * (ground.slope @ along) + t * (ground.slope @ across(along)))
 
 
+SHARPEST = 75.0
+"""degrees; the only two spans of a tower that are further apart than this are the two sides of one
+line, which turns there."""
+
+
 def direction_of(spans: tuple[Span, ...]) -> np.ndarray:
-    """Unit vector (2,) along the line, across the crossarms: north if there is no conductor."""
+    """Unit vector (2,) along the line, across the crossarms, which halve the angle at which the
+    line turns: north if there is no conductor."""
     if not spans:
         return np.array([0.0, 1.0])
     first = unit(spans[0].bearing)
+    apart = SHARPEST if len(spans) == 2 else OPPOSITE
     for other in spans[1:]:
         second = unit(other.bearing)
-        if first @ second < np.cos(np.radians(OPPOSITE)):
+        if first @ second < np.cos(np.radians(apart)):
             both = first - second
             return both / np.linalg.norm(both)
     return first

@@ -86,7 +86,7 @@ class SyntheticSettings(Settings):
         description="catenary parameter (tension over weight per metre), m; sag = span^2 / (8 c)",
     )
     bend: float = Field(
-        30.0, ge=0.0, le=60.0, description="largest change of direction of the line, degrees"
+        30.0, ge=0.0, le=90.0, description="largest change of direction of the line, degrees"
     )
     bend_share: Share = Field(
         0.2, description="share of the towers at which the line changes direction"

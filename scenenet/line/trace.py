@@ -77,6 +77,7 @@ class Wire:
         fit: the catenary, between the first and the last point.
         rows: rows of its points.
         covered: share of the windows between its ends in which it has points.
+        crowd: points in the ring around it for each point on it, in the median of its windows.
         offsets: (k, 2) m, of its subconductors to the left of the catenary and above it. It is that
             of their middle.
     """
@@ -84,6 +85,7 @@ class Wire:
     fit: Fit
     rows: np.ndarray
     covered: float
+    crowd: float
     offsets: np.ndarray
 
 
@@ -260,19 +262,20 @@ def _supported(
     seen = _clear_stretch(along[on], along[beside], window, gap)
     if seen is None:
         return None
-    low, high, covered = seen
+    low, high, covered, crowd = seen
     if high - low < 2 * window or covered < MIN_COVERED:
         return None
     part = on & (along >= low) & (along <= high)
     ends = catenary.between(along[part].min(), along[part].max())
-    return _bundled(stz, near[part], ends, fit, covered)
+    return _bundled(stz, Wire(replace(fit, catenary=ends), near[part], covered, crowd, SINGLE))
 
 
 def _clear_stretch(
     on: np.ndarray, beside: np.ndarray, window: float, gap: float
-) -> tuple[float, float, float] | None:
+) -> tuple[float, float, float, float] | None:
     """Where a wire hangs in free air: start and end, m along it, of the longest stretch without a
-    long gap, and the share of its halves of windows that are clear. None if none is.
+    long gap, the share of its halves of windows that are clear, and the median over these of the
+    points in the ring for each point on the wire. None if none is clear.
 
     Leaves are as dense around a wire as on it.
 
@@ -296,26 +299,25 @@ def _clear_stretch(
     longest = int(np.argmax(stops - starts))
     part = clear[starts[longest] : stops[longest] + 1]
     covered = float(len(part) / (part[-1] - part[0] + 1))
-    return (first + part[0]) * half, (first + part[-1] + 1) * half, covered
+    crowd = float(np.median(n_beside[part] / n_on[part]))
+    return (first + part[0]) * half, (first + part[-1] + 1) * half, covered, crowd
 
 
-def _bundled(
-    stz: np.ndarray, rows: np.ndarray, catenary: Catenary, fit: Fit, covered: float
-) -> Wire:
+def _bundled(stz: np.ndarray, wire: Wire) -> Wire:
     """The wire with its subconductors, if it is a bundle of them.
 
     Subconductors are parallel, so that their points lie at a few places when they are seen along
     the wire.
     """
-    single = Wire(replace(fit, catenary=catenary), rows, covered, SINGLE)
+    rows = wire.rows
     # A narrow fit may follow one subconductor, or go from one to another.
     wide = fit_catenary(stz[rows], np.ones(len(rows)), width=2 * IN_BUNDLE_M)
     if wide is None:
-        return single
+        return wire
     catenary = wide.catenary
     label, places = subconductors(np.column_stack(catenary.residuals(stz[rows])))
     if len(places) == 1:
-        return single
+        return wire
     # All points as if they were on one wire in the middle of the bundle.
     middle = (places.min(axis=0) + places.max(axis=0)) / 2
     own = label >= 0
@@ -323,8 +325,8 @@ def _bundled(
     moved[:, 1:] -= (places[label[own]] - middle) * [catenary.direction[0], 1.0]
     again = fit_catenary(moved, np.ones(len(moved)))
     if again is None:
-        return single
-    return Wire(again, rows, covered, places - middle)
+        return wire
+    return replace(wire, fit=again, offsets=places - middle)
 
 
 def _prior(found: list[Wire]) -> Prior:

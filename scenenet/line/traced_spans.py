@@ -32,6 +32,11 @@ WORST_M = 0.12
 """m, greatest root mean square distance of the points of a wire from its catenary. Leaves within
 the tube of a wire are about 0.17 m from it; a scanner measures to 0.05 m."""
 
+FREE, THICKEST_M = 0.1, 0.3
+"""Points in the ring around a wire for each point on it, up to which it hangs in free air, and m,
+greatest root mean square distance there: no leaves are so far apart from all others, but noise may
+hide that a bundle has several wires. A bundle of four is 0.28 m wide."""
+
 STEEP = 0.4
 """m per metre, rise of a span from which its wires are looked for among uncertain points too, where
 the certain ones show none: observers know wires that are nearly level."""
@@ -162,7 +167,8 @@ def _traced(
     for wire in wires:
         catenary = wire.fit.catenary
         taut = catenary.parameter > TAUTEST_M and catenary.length > LONG_M
-        if len(wire.rows) >= MIN_POINTS and wire.fit.rmse <= WORST_M and not taut:
+        worst = THICKEST_M if wire.crowd <= FREE else WORST_M
+        if len(wire.rows) >= MIN_POINTS and wire.fit.rmse <= worst and not taut:
             yield _span_wire(wire, rows[number[wire.rows]], frame)
 
 

@@ -7,8 +7,10 @@ import pytest
 from fixtures.line_scene import points_on
 
 from scenenet.line.catenary import Catenary
+from scenenet.line.frame import SpanFrame
 from scenenet.line.trace import trace_wires
-from scenenet.line.traced_spans import WORST_M
+from scenenet.line.traced_spans import WORST_M, traced
+from scenenet.line.wire_points import WirePoints
 
 BUNDLES = [
     [(-0.2, 0), (0.2, 0)],
@@ -113,6 +115,30 @@ def test_leaves_hide_no_wire_and_make_none_from_tower_to_tower():
     long = [w for w in wires if w.fit.rmse < WORST_M and w.fit.catenary.length > 60.0]
     assert len(long) == 1
     assert nearest(long, true) < 0.05
+
+
+def among(xyz: np.ndarray):
+    """The wires among points that are all certain, along the axis of x."""
+    points = WirePoints(xyz, np.ones(len(xyz), bool))
+    frame = SpanFrame(0.0, 0.0, np.array([1.0, 0.0]), 280.0)
+    return traced(points, np.arange(len(xyz)), frame)
+
+
+@pytest.mark.parametrize("places", BUNDLES, ids=len)
+def test_a_bundle_in_free_air_is_a_wire_where_noise_hides_how_many_wires_it_has(places):
+    rng = np.random.default_rng(0)
+    parts = [points_on(catenary(5.0 + t, 25.0 + z), 1.0, rng) for t, z in places]
+    noisy = np.concatenate(parts)
+    noisy = noisy + rng.normal(0, 0.1, noisy.shape)
+    (wire,) = among(noisy)
+    assert wire.rmse > WORST_M
+    assert wire.catenary.length > 250.0
+
+
+def test_leaves_as_far_from_a_curve_as_the_wires_of_a_bundle_are_no_wire():
+    rng = np.random.default_rng(0)
+    along = catenary(5.0, 25.0).at(rng.uniform(0.0, 280.0, 2500))
+    assert among(along + rng.uniform((0.0, -1.2, -1.2), (0.0, 1.2, 1.2), along.shape)) == ()
 
 
 def test_nothing_gives_nothing():

@@ -50,6 +50,25 @@ def test_without_ground_the_lowest_points_are_the_foot(tower_scene):
     assert ground.elevation == pytest.approx(scene.foot[2], abs=0.7)
 
 
+def test_without_ground_legs_that_stand_wide_are_the_foot(tower_scene):
+    scene = tower_scene("lattice", 46.0, ground=False, density=20.0)
+    above = scene.xyz[(scene.xyz[:, 2] > scene.foot[2]) & scene.tower]
+    wide = (above - scene.foot) * [2.2, 2.2, 1.0] + scene.foot
+    assert np.hypot(*(wide - scene.foot)[wide[:, 2] < scene.foot[2] + 1, :2].T).min() > 6.0
+    ground = fit_ground(wide, scene.foot[:2])
+    assert ground.elevation == pytest.approx(scene.foot[2], abs=0.7)
+
+
+def test_a_ditch_beside_a_crown_that_hides_the_ground_is_not_the_foot():
+    bare, rng = field(n=8000), np.random.default_rng(2)
+    bare[np.abs(bare[:, 0] - 10) < 1, 2] -= 3
+    hidden = np.hypot(*bare[:, :2].T) < 7
+    crown = bare[hidden][::10]
+    crown[:, 2] += rng.uniform(1, 9, len(crown))
+    ground = fit_ground(np.concatenate([bare[~hidden], crown]), AXIS)
+    assert ground.elevation == pytest.approx(101, abs=0.6)
+
+
 def test_height_is_measured_along_z_from_the_slope():
     ground = fit_ground(field((0.5, 0.0)), AXIS)
     up = ground.height(np.array([4.0, 0.0]), np.zeros(2), np.array([112.0, 100.0]))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import laspy
     import pyproj
 
-CHUNK_POINTS = 500_000
+CHUNK_POINTS = 200_000
 REWRITTEN = {("LASF_Spec", 4), ("laszip encoded", 22204)}
 """Records that laspy creates itself: the descriptions of extra bytes and of the compression."""
 PLAIN_BYTES = 7

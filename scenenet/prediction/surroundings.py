@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict, defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from threading import Lock
 
 import numba
@@ -19,58 +20,74 @@ KEPT_TILES = 64
 """Tiles of voxels kept in memory: successive look-ups mostly need the same ones."""
 
 KEPT_POINTS = 9
-"""Tiles of points kept in memory: those around a tower. A tile of a dense survey takes 30 MB."""
+"""Tiles of points kept in memory: those around a tower. A tile of a dense survey takes 15 MB."""
 
 KEPT_IN_ALL = 1_000_000
-"""Positions kept in memory, in more tiles where they are small: 24 MB. On a slope, more tiles than
+"""Positions kept in memory, in more tiles where they are small: 12 MB. On a slope, more tiles than
 ``KEPT_POINTS`` are around a tower."""
 
 
 @dataclass(frozen=True)
-class _Positions:
-    """The positions in a tile.
+class Positions:
+    """The positions in a tile, in half of the memory of coordinates: each is
+    ``(steps + shift) * size + corner``.
 
     Attributes:
-        columns: (3, n) m: x, y and z, each of which is faster to read alone.
+        steps: (3, n) int32 or float32, of x, y and z, each of which is faster to read alone.
+        shift: in steps.
+        size: m, of a step.
+        corner: (3,) m.
     """
 
-    columns: np.ndarray
+    steps: np.ndarray
+    shift: float
+    size: float
+    corner: np.ndarray
 
     @classmethod
-    def of(cls, xyz: np.ndarray) -> _Positions:
-        return cls(np.ascontiguousarray(xyz.T))
+    def of_voxels(cls, spool: TileSpool, code: int) -> Positions:
+        """The centres of the occupied voxels, as ``TileSpool.centres`` gives them."""
+        steps = spool.tile(code).zyx().T[::-1].astype(np.int32)
+        return cls(steps, 0.5, spool.voxel_size, np.zeros(3))
+
+    @classmethod
+    def of_points(cls, spool: TileSpool, code: int) -> Positions:
+        """The points, as ``TileSpool.points`` gives them."""
+        steps = np.ascontiguousarray(spool.offsets(code).T)
+        return cls(steps, 0.0, 1.0, spool.lattice.corner(code))
 
     def __len__(self) -> int:
-        return self.columns.shape[1]
+        return self.steps.shape[1]
 
     def around(self, place: np.ndarray, radius: float) -> np.ndarray:
         """(3, m) m, those within a planar radius of a place (2,), in their order."""
-        x, y, z = self.columns
-        return _around(x, y, z, *place.tolist(), radius)
+        return _around(self.steps, self.shift, self.size, self.corner, *place.tolist(), radius)
 
 
 @numba.njit(nogil=True, **EXACT)
-def _around(x, y, z, east, north, radius):  # pragma: no cover - compiled
+def _around(steps, shift, size, corner, east, north, radius):  # pragma: no cover - compiled
     """(3, m) m, the positions (n,) within a planar radius of a place, in their order."""
-    rows, n = np.empty(len(x), np.int64), 0
-    for i in range(len(x)):
+    rows, n = np.empty(steps.shape[1], np.int64), 0
+    for i in range(steps.shape[1]):
         rows[n] = i
-        n += within(x[i] - east, y[i] - north, radius)
+        x = (steps[0, i] + shift) * size + corner[0]
+        y = (steps[1, i] + shift) * size + corner[1]
+        n += within(x - east, y - north, radius)
     found = np.empty((3, n))
-    for k in range(n):
-        i = rows[k]
-        found[0, k], found[1, k], found[2, k] = x[i], y[i], z[i]
+    for axis in range(3):
+        for k in range(n):
+            found[axis, k] = (steps[axis, rows[k]] + shift) * size + corner[axis]
     return found
 
 
 class SurveySurroundings:
     """What is near a place; each tile is read when a look-up needs it. Threads may share it."""
 
-    def __init__(self, spool: TileSpool, read: Callable[[int], np.ndarray], kept: int) -> None:
+    def __init__(self, spool: TileSpool, read: Callable[[int], Positions], kept: int) -> None:
         """Start with no tile in memory.
 
         Args:
-            read: gives the positions (n, 3) m in the tile with a code.
+            read: gives the positions in the tile with a code.
             kept: number of tiles in memory; more are kept up to ``KEPT_IN_ALL`` positions.
         """
         self._edge = EDGE * spool.voxel_size
@@ -78,7 +95,7 @@ class SurveySurroundings:
         for code, (_, y, x) in spool.places():
             self._above[x, y].append(code)
         self._read, self._kept = read, kept
-        self._tiles: OrderedDict[int, _Positions] = OrderedDict()
+        self._tiles: OrderedDict[int, Positions] = OrderedDict()
         self._in_memory = 0
         self._lock = Lock()
 
@@ -93,11 +110,11 @@ class SurveySurroundings:
                     near.append(self._tile(code).around(place, radius))
         return np.concatenate(near, axis=1).T
 
-    def _tile(self, code: int) -> _Positions:
+    def _tile(self, code: int) -> Positions:
         """The positions in a tile. Those that were used last stay in memory."""
         with self._lock:
             if code not in self._tiles:
-                self._tiles[code] = _Positions.of(self._read(code))
+                self._tiles[code] = self._read(code)
                 self._in_memory += len(self._tiles[code])
                 while len(self._tiles) > self._kept and self._in_memory > KEPT_IN_ALL:
                     self._in_memory -= len(self._tiles.popitem(last=False)[1])
@@ -107,9 +124,9 @@ class SurveySurroundings:
 
 def occupied_voxels(spool: TileSpool) -> SurveySurroundings:
     """The centres of the occupied voxels."""
-    return SurveySurroundings(spool, lambda code: spool.centres(spool.tile(code).zyx()), KEPT_TILES)
+    return SurveySurroundings(spool, partial(Positions.of_voxels, spool), KEPT_TILES)
 
 
 def survey_points(spool: TileSpool) -> SurveySurroundings:
     """The points."""
-    return SurveySurroundings(spool, spool.points, KEPT_POINTS)
+    return SurveySurroundings(spool, partial(Positions.of_points, spool), KEPT_POINTS)

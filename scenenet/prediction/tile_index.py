@@ -20,6 +20,7 @@ from urllib.parse import unquote
 
 from scenenet.core.errors import InputError
 from scenenet.core.files import read_json
+from scenenet.core.gdal import load_pyogrio
 
 SUFFIXES = frozenset({".las", ".laz"})
 """Endings of the files that belong to a survey of tiles; COPC files end in ``.copc.laz``."""
@@ -177,16 +178,15 @@ def _point_file(item: Any) -> str | None:
 
 def _rows(path: Path) -> Iterator[_Entry]:
     """The rows of the first layer of a GeoPackage that has a column with files."""
-    import pyogrio
-
+    gdal = load_pyogrio()
     try:
-        for layer in pyogrio.list_layers(path)[:, 0]:
-            fields = pyogrio.read_info(path, layer=layer)["fields"]
+        for layer in gdal.list_layers(path)[:, 0]:
+            fields = gdal.read_info(path, layer=layer)["fields"]
             known = {name.lower(): name for name in fields}
             column = next((known[name] for name in COLUMNS if name in known), None)
             if column is None:
                 continue
-            read = pyogrio.raw.read(path, layer=layer, columns=[column], read_geometry=False)
+            read = gdal.raw.read(path, layer=layer, columns=[column], read_geometry=False)
             for number, value in enumerate(read[3][0], start=1):
                 href = value if isinstance(value, str) and value.strip() else None
                 yield _Entry(f"layer {layer}: row {number}", href)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from scenenet.core.files import write_json
+from scenenet.core.gdal import load_pyogrio
 from scenenet.detection.survey_tower import SurveyTower, row_types
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.styles import STYLES
@@ -218,14 +219,13 @@ def write_layer(
         crs: of the coordinates; None if it is not known.
     """
     import shapely
-    from pyogrio import set_gdal_config_options
-    from pyogrio.raw import write
 
+    gdal = load_pyogrio()
     # The file appears when it is whole. To wait for the disk after each layer would add nothing.
-    set_gdal_config_options({"OGR_CURRENT_DATE": WRITTEN, "OGR_SQLITE_SYNCHRONOUS": "OFF"})
+    gdal.set_gdal_config_options({"OGR_CURRENT_DATE": WRITTEN, "OGR_SQLITE_SYNCHRONOUS": "OFF"})
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "'crs' was not provided")  # the survey has none
-        write(
+        gdal.raw.write(
             path,
             layer=name,
             driver="GPKG",

@@ -149,7 +149,6 @@ def _write_lists(
     """Write the tower list, the status and the summary; they appear when ``stack`` is left."""
     lists = {path: stack.enter_context(atomic(path)) for path in files.lists}
     record = stack.enter_context(atomic(files.summary))
-    write_layers(prediction, lists[files.geopackage])
     if files.geojson is not None:
         crs, sizes = prediction.crs, prediction.unit_sizes
         write_geojson(lists[files.geojson], prediction.towers, crs, sizes)
@@ -164,6 +163,9 @@ def _write_lists(
     give_back()
     if files.page is not None:
         write_page(prediction, lists[files.page])
+        give_back()
+    # The last of what takes memory: the library of GeoPackages stays in it.
+    write_layers(prediction, lists[files.geopackage])
     if files.status is not None:
         write_status(lists[files.status], prediction.files, prediction.target_names)
     prints = {files.key(path): fingerprint(partial) for path, partial in lists.items()}

@@ -96,11 +96,11 @@ def write_many(prediction: SurveyPrediction, path: Path) -> None:
     )  # fmt: skip
     content = PageContent.of(large)
     assert content.budget.share == 1
-    page = survey_page(
+    parts = survey_page(
         large, content, (replace(tower, tower=t.id) for t, _ in content.towers),
         (replace(drawn, span_id=one.span.span_id) for one in content.spans),
     )  # fmt: skip
-    path.write_text(page, "utf-8")
+    path.write_text("".join(parts), "utf-8")
 
 
 def selected(tab) -> int:

@@ -7,7 +7,12 @@ import pytest
 from fixtures.spools import spool_of
 
 from scenenet.prediction import surroundings
-from scenenet.prediction.surroundings import SurveySurroundings, occupied_voxels, survey_points
+from scenenet.prediction.surroundings import (
+    Positions,
+    SurveySurroundings,
+    occupied_voxels,
+    survey_points,
+)
 from scenenet.prediction.work.lattice import Lattice
 from scenenet.prediction.work.tiling import TileSpool
 
@@ -47,12 +52,23 @@ def test_points_are_those_of_the_survey(spool, radius):
     )
 
 
+def test_positions_are_those_of_the_survey_to_the_last_bit(tmp_path):
+    spool = spool_of(tmp_path / "work", 0.7, [XYZ])
+    codes = [code for code, _ in spool.places()]
+    for look_up, expected in (
+        (survey_points(spool), [spool.points(code) for code in codes]),
+        (occupied_voxels(spool), [spool.centres(spool.tile(code).zyx()) for code in codes]),
+    ):
+        found, every = look_up(ORIGIN[:2], 1000.0), np.concatenate(expected)
+        np.testing.assert_array_equal(found[np.lexsort(found.T)], every[np.lexsort(every.T)])
+
+
 def test_small_tiles_are_read_once(spool):
     reads = []
 
     def read(code):
         reads.append(code)
-        return spool.points(code)
+        return Positions.of_points(spool, code)
 
     near = SurveySurroundings(spool, read, kept=2)
     for _ in range(2):
@@ -66,7 +82,7 @@ def test_large_tiles_do_not_all_stay_in_memory(spool, monkeypatch):
 
     def read(code):
         reads.append(code)
-        return spool.points(code)
+        return Positions.of_points(spool, code)
 
     near = SurveySurroundings(spool, read, kept=2)
     near(ORIGIN[:2], 1000.0)

@@ -48,7 +48,8 @@ def page_of(prediction, pictures: bool = False) -> str:
     """The page of a prediction, perhaps with the pictures of its towers."""
     content = PageContent.of(prediction)
     towers = [tower for tower, _ in content.towers] if pictures else []
-    return survey_page(prediction, content, tower_pictures(prediction, towers, content.budget))
+    pictured = tower_pictures(prediction, towers, content.budget)
+    return "".join(survey_page(prediction, content, pictured))
 
 
 def data_of(page: str) -> dict:
@@ -205,7 +206,7 @@ def test_the_page_of_a_large_survey_is_bounded_and_says_what_it_leaves_out(line,
         points = content.budget.points(OWN_POINTS + OTHER_POINTS)
         steps = np.full((points, 3), 12_345, "<i2")
         drawn = (TowerPicture(tower.id, steps, 10) for tower, _ in content.towers)
-        page = survey_page(large, content, drawn)
+        page = "".join(survey_page(large, content, drawn))
     listed = page.count("<tr data-tower=")
     assert 3000 < listed < n
     assert len(data_of(page)["towers"]) == page.count('id="points-') == listed

@@ -191,7 +191,7 @@ def many(line, model, tmp_path_factory) -> Path:
         many = replace(prediction, towers=tuple(towers))
         content = PageContent.of(many)
         again = (replace(drawn[(t.id - 1) % 3], tower=t.id) for t, _ in content.towers)
-        path.write_text(survey_page(many, content, again), "utf-8")
+        path.write_text("".join(survey_page(many, content, again)), "utf-8")
     return path
 
 

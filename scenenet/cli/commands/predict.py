@@ -201,14 +201,14 @@ def command(
     """
     from scenenet.core.code_hash import code_hash
     from scenenet.core.errors import InputError
-    from scenenet.core.gdal import load_without_data_frames
+    from scenenet.core.gdal import leave_out_data_frames
     from scenenet.pointcloud.copc import require_pdal
     from scenenet.prediction import writers
     from scenenet.prediction.result_files import PredictionFiles
     from scenenet.prediction.settings import PredictSettings
     from scenenet.prediction.survey_files import SurveyFiles
 
-    load_without_data_frames()
+    leave_out_data_frames()
     settings = PredictSettings(
         voxel_size=voxel_size,
         classify=classify,

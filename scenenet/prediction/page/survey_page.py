@@ -5,16 +5,17 @@ from __future__ import annotations
 import base64
 import hashlib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from itertools import chain
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
 from scenenet.clearance.sags import with_sags
 from scenenet.clearance.settings import ClearanceSettings
-from scenenet.core.files import write_text
+from scenenet.core.files import atomic
 from scenenet.pointcloud.units import SYMBOLS
 from scenenet.prediction.page import markup
 from scenenet.prediction.page.budget import PageBudget
@@ -69,6 +70,9 @@ SCRIPTS = (
 )
 """Parts of the style and of the script of a page, in their order there."""
 
+PICTURES = "$pictures\n"
+"""Where the pictures are in the page."""
+
 PAGE_BYTES = 150_000
 """Size of a page without towers, and of that of a survey that is little more than one tower. What
 towers and spans add is less than a hundredth of the points around them."""
@@ -114,13 +118,12 @@ def write_page(prediction: SurveyPrediction, path: str | Path) -> None:
     content = PageContent.of(prediction)
     towers = [tower for tower, _ in content.towers]
     spans = [one.span for one in content.spans]
-    write_text(
-        path,
-        survey_page(
-            prediction, content, tower_pictures(prediction, towers, content.budget),
-            span_pictures(flown, spans, content.budget),
-        ),
+    parts = survey_page(
+        prediction, content, tower_pictures(prediction, towers, content.budget),
+        span_pictures(flown, spans, content.budget),
     )  # fmt: skip
+    with atomic(path) as partial, partial.open("w", encoding="utf-8") as stream:
+        stream.writelines(parts)
 
 
 def survey_page(
@@ -128,8 +131,9 @@ def survey_page(
     content: PageContent,
     of_towers: Iterable[TowerPicture],
     of_spans: Iterable[SpanPicture] = (),
-) -> str:
-    """The page of a survey as HTML.
+) -> Iterator[str]:
+    """The page of a survey as HTML, part after part: the pictures of a long line take most of it,
+    and only one is in memory.
 
     Args:
         content: what it lists.
@@ -145,7 +149,7 @@ def survey_page(
     if prediction.line is not None:
         caveats += markup.note("What the spans do not show", line_not_seen(prediction))
     subject = "Towers" if prediction.line is None else "Towers and spans"
-    return _template("page.html").substitute(
+    values = dict(
         title=escape(f"{subject} of {name}"),
         style=style,
         script=script,
@@ -161,10 +165,12 @@ def survey_page(
         files=file_table(prediction.files),
         parameters=parameter_table(prediction),
         data=markup.json_text(_data(prediction, content, frame, units)),
-        pictures="\n".join(
-            [*map(tower_picture, of_towers), *map(span_picture, of_spans)]
-        ),
-    )  # fmt: skip
+    )
+    before, after = _template("page.html").template.split(PICTURES)
+    yield Template(before).substitute(values)
+    for picture in chain(map(tower_picture, of_towers), map(span_picture, of_spans)):
+        yield f"{picture}\n"
+    yield Template(after).substitute(values)
 
 
 def as_measured(prediction: SurveyPrediction) -> SurveyPrediction:

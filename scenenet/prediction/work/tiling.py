@@ -211,8 +211,12 @@ class TileSpool:
         Raises:
             ValueError: the spool is that of voxels of a further size.
         """
-        offset = self._offsets(code)
-        return offset[_by_height(offset)] + self.lattice.corner(code)
+        return self.offsets(code) + self.lattice.corner(code)
+
+    def offsets(self, code: int) -> np.ndarray:
+        """(n, 3) float32 m, the same from the corner of the tile (``Lattice.corner``)."""
+        offset = self._added(code)
+        return offset[_by_height(offset)]
 
     def classified_points(self, code: int) -> tuple[np.ndarray, np.ndarray]:
         """As ``points``, with the class codes (n,) uint8 of the points, which the files keep.
@@ -220,11 +224,11 @@ class TileSpool:
         Raises:
             ValueError: the spool is that of voxels of a further size.
         """
-        offset, classes = self._offsets(code), self._read(CLASSES, code, np.dtype(np.uint8))
+        offset, classes = self._added(code), self._read(CLASSES, code, np.dtype(np.uint8))
         order = _by_height(offset)
         return offset[order] + self.lattice.corner(code), classes[order]
 
-    def _offsets(self, code: int) -> np.ndarray:
+    def _added(self, code: int) -> np.ndarray:
         """(n, 3) float32 m, points of a tile from its corner, as they were added."""
         if self.kind != VOXELS:
             raise ValueError(f"there are no points in tiles of {self.voxel_size:g} m voxels")

@@ -45,7 +45,7 @@ def write_text(path: str | Path, text: str) -> None:
 
 def write_json(path: str | Path, data: Any) -> None:
     """Write ``data`` as indented JSON; NaN raises a ValueError, because JSON has none."""
-    # Piece by piece: the text of a list of thousands of towers takes ten times its size in memory.
+    # Piece by piece: a whole text takes five times its size in memory while it is put together.
     with atomic(path) as partial, partial.open("w", encoding="utf-8") as stream:
         json.dump(data, stream, indent=2, allow_nan=False)
         stream.write("\n")

@@ -18,6 +18,10 @@ REACH_M = 5.0
 Trees beside a line touch one another for hundreds of metres, and each of them may have to be cut.
 """
 
+LOW_M = 1.0
+"""m above the ground up to which growth is low. It fills the gaps between crowns, and may be nearer
+to a conductor than they are: a crown beside it would be listed only where the low growth is."""
+
 
 def places(xyz: np.ndarray, kind: np.ndarray) -> Iterator[np.ndarray]:
     """Rows (m,) of the points of each place; a place has points of one kind.
@@ -39,6 +43,18 @@ def places(xyz: np.ndarray, kind: np.ndarray) -> Iterator[np.ndarray]:
         place = place[cell.ravel()]
         for each in range(n):
             yield rows[place == each]
+
+
+def layers(low: np.ndarray, few: int) -> list[np.ndarray]:
+    """Rows (m,) of the points of a place in each layer of it: of low growth, and of what stands
+    above it. Fewer than ``few`` points make no layer; they belong to the other one.
+
+    Args:
+        low: (n,) bool, which points are of low growth.
+    """
+    if min(low.sum(), (~low).sum()) < few:
+        return [np.arange(len(low))]
+    return [np.flatnonzero(~low), np.flatnonzero(low)]
 
 
 def divided(xyz: np.ndarray, distance: np.ndarray, few: int) -> list[np.ndarray]:

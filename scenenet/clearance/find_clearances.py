@@ -178,14 +178,16 @@ class _Finder:
         return found
 
     def _parts(self, too_near: TooNear) -> Iterator[np.ndarray]:
-        """Rows (m,) of the points of each place; a long one of vegetation is several."""
+        """Rows (m,) of the points of each place; one of vegetation may be several."""
         for rows in danger.places(too_near.xyz, too_near.kind):
             if POINT_KINDS[too_near.kind[rows[0]]] != VEGETATION:
                 yield rows
                 continue
             few = self._settings.few_points
-            for part in danger.divided(too_near.xyz[rows], too_near.distance[rows], few):
-                yield rows[part]
+            for layer in danger.layers(too_near.low[rows], few):
+                own = rows[layer]
+                for part in danger.divided(too_near.xyz[own], too_near.distance[own], few):
+                    yield own[part]
 
     def _place(self, what: str, point: NearPoint, points: int, other_span: int = 0) -> Clearance:
         wire = point.conductor

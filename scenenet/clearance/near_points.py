@@ -43,6 +43,7 @@ class TooNear:
         kind: (n,) number in ``POINT_KINDS``.
         conductor: (n,) id of the nearest conductor of the span.
         along, distance: (n,) m, as ``NearPoint``.
+        low: (n,) bool, which are close above the ground.
     """
 
     xyz: np.ndarray
@@ -50,11 +51,12 @@ class TooNear:
     conductor: np.ndarray
     along: np.ndarray
     distance: np.ndarray
+    low: np.ndarray
 
     @classmethod
     def together(cls, parts: Sequence[TooNear]) -> TooNear:
         """All points of several, at least one."""
-        names = ("xyz", "kind", "conductor", "along", "distance")
+        names = ("xyz", "kind", "conductor", "along", "distance", "low")
         return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
@@ -81,6 +83,7 @@ def near_points(
     conductors: Sequence[Conductor],
     limits: ClearanceLimits | None,
     lone: np.ndarray,
+    low: np.ndarray,
 ) -> Near:
     """The nearest of points to conductors, and those that are too near.
 
@@ -91,6 +94,7 @@ def near_points(
         kind: (n,) number in ``POINT_KINDS``.
         step: (n,) number of the step along the span.
         lone: (n,) bool, which points are lone ones.
+        low: (n,) bool, which are close above the ground.
         conductors: of the span.
         limits: for the voltage, also of earth wires, because a conductor may be taken for one. None
             without a voltage.
@@ -124,7 +128,7 @@ def near_points(
         own = rows[closer]
         closest[own], at[own], owner[own] = distance[closer], along[closer], conductor.conductor_id
     found = np.flatnonzero(np.isfinite(closest))
-    too_near = TooNear(xyz[found], kind[found], owner[found], at[found], closest[found])
+    too_near = TooNear(xyz[found], kind[found], owner[found], at[found], closest[found], low[found])
     by_step = tuple((each // len(POINT_KINDS), steps[each]) for each in sorted(steps))
     return Near(tuple(nearest), by_step, too_near)
 

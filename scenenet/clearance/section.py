@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from scenenet.clearance.danger import LOW_M
 from scenenet.clearance.kinds import NO_OBSTACLE, Surroundings, surroundings
 from scenenet.clearance.near_points import Near, near_points
 from scenenet.clearance.settings import ClearanceLimits, ClearanceSettings
@@ -139,7 +140,9 @@ def measure(
     trees = find_trees(around, settings.tree_height)
     inside = area.has(trees.feet)
     return MeasuredSection(
-        near_points(xyz, kind, step, conductors, limits, around.lone[here]),
+        near_points(
+            xyz, kind, step, conductors, limits, around.lone[here], around.height[here] < LOW_M
+        ),
         Trees(trees.feet[inside], trees.height[inside]),
     )
 

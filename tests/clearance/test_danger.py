@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenenet.clearance.danger import REACH_M, divided, places
+from scenenet.clearance.danger import REACH_M, divided, layers, places
 
 
 def hedge() -> tuple[np.ndarray, np.ndarray]:
@@ -40,3 +40,12 @@ def test_a_twig_beyond_a_tree_is_no_place_and_a_single_point_is_one():
     assert len(part) == len(xyz)
     (part,) = divided(twig, np.array([1.0]), few=5)
     assert len(part) == 1
+
+
+def test_low_growth_and_what_stands_above_it_are_layers_if_both_have_enough_points():
+    low = np.array([True] * 6 + [False] * 8)
+    above, below = layers(low, few=5)
+    assert not low[above].any() and low[below].all()
+    assert len(above) + len(below) == len(low)
+    (together,) = layers(low[2:], few=5)
+    assert len(together) == len(low) - 2

@@ -282,3 +282,21 @@ def test_what_was_taken_for_a_conductor_is_an_obstacle_once_it_is_rejected(corri
 
     assert on_it(untraced) == 0
     assert on_it(found) > 0
+
+
+def test_a_crown_beside_low_growth_that_is_nearer_is_a_place_of_its_own():
+    wire = Catenary((0.0, 0.0, 4.0), (60.0, 0.0, 4.0), 1e6)
+    ground = np.array([(x, y, 0.0) for x in np.arange(0, 60, 0.5) for y in np.arange(-9, 9, 0.5)])
+    across = np.linspace(-0.5, 0.5, 3)
+    low = np.array([(30 + x, 1.0 + y, 0.7) for x in across for y in across])
+    crown = np.array([(32 + x, 3.6 + y, 2.5) for x in across for y in across])
+    xyz = np.concatenate((ground, low, crown))
+    span = span_of(1, 1, np.array([(0.0, 0.0), (60.0, 0.0)]))
+    found = find_clearances(
+        SurveyLine((span,), (wire_of(wire, 1, 1),), ()),
+        lambda area: SectionPoints(xyz[area.has(xyz)]),
+        SETTINGS,
+    )
+    plants = [place for place in found.dangers if place.kind == "vegetation"]
+    assert [(place.z, place.points) for place in plants] == [(0.7, 9), (2.5, 6)]
+    assert [place.x for place in plants] == pytest.approx([30, 32], abs=0.6)

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+import numpy as np
+
 from scenenet.cli.inputs import Failures
 from scenenet.core.errors import InputError, in_file, warn
 from scenenet.core.outputs import check_space
@@ -28,8 +30,9 @@ from scenenet.dataset.voxel_cache import VOXEL_BYTES, Dataset, build, load
 from scenenet.dataset.voxels import VoxelSample, VoxelSettings
 from scenenet.evaluation.surveys import LabelledSurvey
 from scenenet.measurement.registry import PRESENCE, measurement_named
-from scenenet.pointcloud import PointCloud, class_scheme, survey_in_metres
+from scenenet.pointcloud import PointCloud, class_scheme, iter_chunks, survey_in_metres
 from scenenet.pointcloud.point_fields import PointField
+from scenenet.pointcloud.quality.codes import codes_found
 from scenenet.pointcloud.quality.screening import survey_warnings
 from scenenet.pointcloud.reading import same_points
 from scenenet.pointcloud.targets import TOWER, Target
@@ -277,6 +280,16 @@ def require_crops(
     raise InputError(
         f"no labelled {target.name} in it ({reasons})",
         file=", ".join(str(path) for path in paths),
-        remedy=f"Check --codes, and that the points of {target.name} are labelled "
-        f"{' or '.join(map(str, own))}",
+        remedy=f"Check --codes: in {codes} the points of {target.name} have the code "
+        f"{' or '.join(map(str, own))}, and here are the codes {codes_found(_counts(paths))}",
+    )
+
+
+def _counts(paths: Sequence[Path]) -> np.ndarray:
+    """(256,) points of each class code in files."""
+    files = [file for path in paths for file in sample_files(path) or [path]]
+    chunks = (chunk for file in files for chunk in iter_chunks(file))
+    return sum(
+        (np.bincount(chunk.classification, minlength=256) for chunk in chunks),
+        np.zeros(256, np.int64),
     )

@@ -142,3 +142,12 @@ def test_only_towers_are_explained(files, tmp_path, call):
                    tmp_path / "e.html")  # fmt: skip
     assert refused.code == 1
     assert "it finds pole, and only towers are explained" in refused.err
+
+
+def test_without_the_target_the_error_has_the_codes_of_the_file(files, tmp_path, call):
+    survey, out = files / "s.laz", tmp_path / "m.json"
+    done = call("train", survey, "--codes", "edp", "--target", "wire", "--out", out)
+    assert done.code == 1 and not out.exists()
+    text = " ".join(done.err.split())
+    assert f"{survey}: no labelled wire in it" in text
+    assert "in edp the points of wire have the code 16 or 17, and here are the codes 2 (" in text

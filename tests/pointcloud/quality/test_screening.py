@@ -187,6 +187,22 @@ def test_codes_that_do_not_fit_the_scheme_are_reported(survey):
     assert "code 16 (500 points) is 'Main power line' in edp" in text
 
 
+def test_towers_without_conductors_are_said_with_the_codes_of_the_file(survey):
+    codes = np.where(EDP_CODES == 16, 77, EDP_CODES).astype(np.uint8)
+    undefined, text = warnings_of(survey(corridor(), codes), "edp")
+    assert "does not define these codes: 77" in undefined
+    assert "500 points are labelled tower, and 0 conductor (code 16 or 17 in edp)" in text
+    assert "name it with --codes" in text
+    assert "the codes 2 (2000 points), 4 (1000 points), 15 (500 points), 77 (500 points)" in text
+
+
+def test_without_towers_the_codes_of_the_file_are_said(survey):
+    codes = np.where(EDP_CODES == 15, 1, EDP_CODES).astype(np.uint8)
+    (text,) = warnings_of(survey(corridor(), codes), "edp")
+    assert "no point is labelled tower (code 15 in edp)" in text
+    assert text.endswith("2 (2000 points), 4 (1000 points), 1 (500 points), 16 (500 points)")
+
+
 def test_the_samples_of_a_folder_are_judged_together(survey, tmp_path):
     xyz = corridor()
     single = xyz.astype(np.float32)

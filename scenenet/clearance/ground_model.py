@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenenet.clearance.bilinear import bilinear_at
 from scenenet.clearance.gaussian import gaussian_at
 
 CELL_M = 1.0
@@ -55,10 +56,7 @@ class GroundModel:
         return self._read(self.steepness, xy)
 
     def _read(self, raster: np.ndarray, xy: np.ndarray) -> np.ndarray:
-        from scipy import ndimage
-
-        at = ((xy - self.corner) / CELL_M).T[::-1]
-        return np.asarray(ndimage.map_coordinates(raster, at, order=1, mode="nearest"))
+        return bilinear_at(raster, self.corner, CELL_M, xy)
 
     @classmethod
     def from_ground(cls, xyz: np.ndarray, box: np.ndarray) -> GroundModel:

@@ -27,7 +27,8 @@ def thinned(xyz: np.ndarray, most: int) -> np.ndarray:
         return xyz
     low, high = extent(xyz)
     # Not the lowest point of each cell: trees would look like shelves.
-    xyz = np.random.default_rng(0).permutation(xyz)
+    # A permutation of the rows themselves gives the same in twice the time.
+    xyz = np.take(xyz, np.random.default_rng(0).permutation(len(xyz)), axis=0)
     offsets = xyz - low
     # Points lie on surfaces: about as many cells as points of the result cover the widest one.
     cell = max(STEP_M, float(np.sqrt(np.prod(np.sort(high - low)[1:]) / most)) / 4)

@@ -10,8 +10,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 
+import numba
 import numpy as np
 
+from scenenet.core.compilation import EXACT
 from scenenet.core.errors import InputError
 from scenenet.dataset.voxels import BORDER_M
 
@@ -38,19 +40,14 @@ class Lattice:
         Raises:
             InputError: a coordinate is outside the lattice.
         """
-        # Axis by axis, which takes half the time of all three together.
-        steps = [np.floor((xyz[:, axis] + BORDER_M) / self.voxel_size) for axis in (2, 1, 0)]
-        inside = [np.abs(step) < _BIAS * EDGE for step in steps]
-        if not all(each.all() for each in inside):
-            row = int(np.argmin(np.logical_and.reduce(inside)))
+        codes, voxels, n = _located(np.asarray(xyz, float), self.voxel_size, BORDER_M)
+        if n < len(xyz):
             raise InputError(
-                f"the point {xyz[row].tolist()} is too far from the origin for voxels of "
+                f"the point {xyz[n].tolist()} is too far from the origin for voxels of "
                 f"{self.voxel_size:g} m",
                 remedy="Remove stray points, or convert the survey to metres",
             )
-        z, y, x = (step.astype(np.int64) for step in steps)
-        voxel = ((z & (EDGE - 1)) * EDGE + (y & (EDGE - 1))) * EDGE + (x & (EDGE - 1))
-        return codes_of(z >> 6, y >> 6, x >> 6), voxel.astype(np.int32)
+        return codes, voxels
 
     def centres(self, zyx: np.ndarray) -> np.ndarray:
         """(M, 3) xyz, m, centres of the voxels (M, 3) on the lattice."""
@@ -70,6 +67,25 @@ class Lattice:
             for low, high in (x, y)
         )
         return set(product(range(west, east + 1), range(south, north + 1)))
+
+
+@numba.njit(**EXACT)
+def _located(xyz, voxel_size, border):  # pragma: no cover - compiled
+    """Tile code (n,) and position in the tile (n,) of points (n, 3), and how many were located
+    before the first one that is outside the lattice."""
+    codes, voxels = np.empty(len(xyz), np.int64), np.empty(len(xyz), np.int32)
+    most = float(_BIAS * EDGE)
+    for i in range(len(xyz)):
+        x = np.floor((xyz[i, 0] + border) / voxel_size)
+        y = np.floor((xyz[i, 1] + border) / voxel_size)
+        z = np.floor((xyz[i, 2] + border) / voxel_size)
+        if not (abs(x) < most and abs(y) < most and abs(z) < most):
+            return codes, voxels, i
+        a, b, c = np.int64(z), np.int64(y), np.int64(x)
+        voxels[i] = ((a & (EDGE - 1)) * EDGE + (b & (EDGE - 1))) * EDGE + (c & (EDGE - 1))
+        code = (((a >> 6) + _BIAS) << (2 * _BITS)) | (((b >> 6) + _BIAS) << _BITS)
+        codes[i] = code | ((c >> 6) + _BIAS)
+    return codes, voxels, len(xyz)
 
 
 def code_of(place: tuple[int, int, int]) -> int:
@@ -92,9 +108,17 @@ def column_of(code: int) -> tuple[int, int]:
 
 def groups(codes: np.ndarray) -> Iterable[tuple[int, np.ndarray]]:
     """Each distinct code in ``codes`` (n,), with its rows."""
-    order = np.argsort(codes, kind="stable")
-    borders = np.flatnonzero(np.diff(codes[order])) + 1
-    for rows in np.split(order, borders) if len(order) else []:
+    if not len(codes):
+        return
+    # Neighbours in a file are mostly in one tile: runs of equal codes are sorted, not all points.
+    starts = np.flatnonzero(np.concatenate(([True], codes[1:] != codes[:-1])))
+    lengths = np.diff(starts, append=len(codes))
+    runs = np.argsort(codes[starts], kind="stable")
+    starts, lengths = starts[runs], lengths[runs]
+    ends = np.cumsum(lengths)
+    order = np.arange(len(codes)) + np.repeat(starts - (ends - lengths), lengths)
+    own = codes[starts]
+    for rows in np.split(order, ends[:-1][own[1:] != own[:-1]]):
         yield int(codes[rows[0]]), rows
 
 

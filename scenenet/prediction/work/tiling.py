@@ -216,7 +216,7 @@ class TileSpool:
     def offsets(self, code: int) -> np.ndarray:
         """(n, 3) float32 m, the same from the corner of the tile (``Lattice.corner``)."""
         offset = self._added(code)
-        return offset[_by_height(offset)]
+        return np.take(offset, _by_height(offset), axis=0)  # as an index, in half of the time
 
     def classified_points(self, code: int) -> tuple[np.ndarray, np.ndarray]:
         """As ``points``, with the class codes (n,) uint8 of the points, which the files keep.
@@ -226,7 +226,7 @@ class TileSpool:
         """
         offset, classes = self._added(code), self._read(CLASSES, code, np.dtype(np.uint8))
         order = _by_height(offset)
-        return offset[order] + self.lattice.corner(code), classes[order]
+        return np.take(offset, order, axis=0) + self.lattice.corner(code), classes[order]
 
     def _added(self, code: int) -> np.ndarray:
         """(n, 3) float32 m, points of a tile from its corner, as they were added."""

@@ -19,8 +19,12 @@ KEPT_POINTS = 4_000_000
 JUMPER_M = 3.0
 """m beyond the reach of a tower in which points in voxels of wires are its jumpers and strings."""
 
-FREE, TOWER, WIRE = 0, 1, 2
-"""What a point belongs to: nothing, the structure of a tower, or a voxel of a wire."""
+FREE, TOWER, WIRE, NOISE = 0, 1, 2, 3
+"""What a point belongs to: nothing, the structure of a tower, a voxel of a wire, or noise."""
+
+LOW_POINT = 7
+"""Class of points that the producer marked as noise, in every version of LAS and every scheme that
+has it."""
 
 
 class WireVoxels:
@@ -53,7 +57,7 @@ class AreaPoints:
 
     Attributes:
         xyz: (n, 3) m.
-        part: (n,) uint8, one of ``FREE``, ``TOWER`` and ``WIRE``.
+        part: (n,) uint8, one of ``FREE``, ``TOWER``, ``WIRE`` and ``NOISE``.
         codes: (n,) uint8 class codes; None where they are not known.
     """
 
@@ -71,18 +75,15 @@ class AreaPoints:
 class AreaLookUp:
     """Gives the points of a survey in an area. Tiles that were used last stay in memory."""
 
-    def __init__(
-        self, spool: TileSpool, structures: Structures, wires: WireVoxels, *, classes: bool
-    ) -> None:
+    def __init__(self, spool: TileSpool, structures: Structures, wires: WireVoxels) -> None:
         """Start with no tile in memory.
 
         Args:
             spool: the points of all files of the survey.
             structures: the shapes of its towers.
             wires: where the model of wires found them.
-            classes: whether ``spool`` has the class codes of the points.
         """
-        self._spool, self._wires, self._classes = spool, wires, classes
+        self._spool, self._wires, self._classes = spool, wires, spool.classified
         self._columns = spool.columns()
         self._owners = Owners(structures, spool.lattice)
         shapes = [shape for _, shape in structures.numbered]
@@ -106,9 +107,10 @@ class AreaLookUp:
         )
 
     def obstacles(self, area: Area) -> SectionPoints:
-        """The points in an area that belong to no tower, nor to its jumpers and strings."""
+        """The points in an area that belong to no tower, nor to its jumpers and strings, and are no
+        noise."""
         found = self.all(area)
-        free = found.part != TOWER
+        free = (found.part != TOWER) & (found.part != NOISE)
         wire = np.flatnonzero(found.part == WIRE)
         free[wire] = ~self._at_tower(found.xyz[wire])
         found = found.at(free)
@@ -133,6 +135,8 @@ class AreaLookUp:
             part = np.full(len(xyz), FREE, np.uint8)
             part[self._wires.have(xyz)] = WIRE
             part[self._owners(xyz, np.full(len(xyz), code)) > 0] = TOWER
+            if codes is not None:
+                part[codes == LOW_POINT] = NOISE
             self._kept[code] = AreaPoints(xyz, part, codes)
             while len(self._kept) > 1 and self._held() > KEPT_POINTS:
                 self._kept.popitem(last=False)

@@ -30,11 +30,11 @@ def find_clearances_in_survey(
         wires: where the model of wires found them. Points there are no obstacles if they are at a
             tower or run along the span: they are of jumpers, or of conductors that were not traced.
         scheme: of the class codes, which ``spool`` then keeps; None where the height above ground
-            says what points are.
+            says what points are. Points with the class of noise are no obstacles in either case.
         progress: label of the progress on stderr; None shows no progress.
 
     Raises:
         InputError: the limits have none for the voltage.
     """
-    points = AreaLookUp(spool, structures, wires, classes=scheme is not None)
+    points = AreaLookUp(spool, structures, wires)
     return find_clearances(line, points.obstacles, settings, scheme, progress)

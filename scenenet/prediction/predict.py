@@ -99,7 +99,7 @@ def predict_survey(
     place = temporary_directory() if work is None else work.folder
     check_space({place: size - (0 if work is None else work.bytes_kept())})
     with nullcontext(work) if work is not None else _scratch() as folder:
-        classes = scheme is not None and finds_lines(used)
+        classes = finds_lines(used)  # noise has a class whatever the scheme is
         _read_files(survey, folder, layers, settings.chunk_points, classes=classes)
         give_back()
         joined = SurveyWork.open(survey, folder.reads(survey))

@@ -21,6 +21,7 @@ from scenenet.detection.profile import Profile
 from scenenet.detection.structure import Structure
 from scenenet.line.frame import SpanFrame
 from scenenet.line.records import AS_FLOWN, SurveyLine
+from scenenet.pointcloud import PointCloud, write_las
 from scenenet.pointcloud.class_schemes import EDP
 from scenenet.prediction.area_points import JUMPER_M, AreaLookUp, WireVoxels
 from scenenet.prediction.clearance_lists import write_clearance_layers, write_clearances_csv
@@ -108,6 +109,33 @@ def test_class_codes_stay_with_their_points(survey):
     assert read == len(points.xyz)
 
 
+def test_points_with_the_class_of_noise_are_no_obstacles_without_a_scheme(survey, wires, tmp_path):
+    points, _, line = survey
+    wire = line.conductors[0]
+    middle = wire.catenary.at_shares(np.array([0.5]))[0]
+    flock = middle + np.random.default_rng(0).uniform(-0.4, 0.4, (30, 3)) - (0.0, 0.0, 1.5)
+
+    def dangers(code: int) -> int:
+        """Places too near of points with a class, which height alone would call vegetation."""
+        cloud = PointCloud(
+            np.concatenate([points.xyz, flock]),
+            np.append(np.asarray(points.classification), np.full(len(flock), code)).astype(
+                np.uint8
+            ),
+        )
+        path = tmp_path / f"{code}.laz"
+        write_las(path, cloud)
+        read_file(path, path.name, tmp_path / f"{code}", VOXEL_M, 20_000, classes=True)
+        work = WorkFile.open(tmp_path / f"{code}")
+        spool = TileSpool(work.lattice, [work.blocks])
+        found = find_clearances_in_survey(spool, line, Structures(()), wires, SETTINGS)
+        at = np.array([(p.x, p.y, p.z) for p in found.dangers]).reshape(-1, 3)
+        return int((np.linalg.norm(at - flock.mean(axis=0), axis=1) < 0.8).sum())
+
+    assert dangers(1) == 1
+    assert dangers(7) == 0
+
+
 def test_points_of_wires_that_were_not_traced_are_no_obstacles(survey, wires):
     points, spool, line = survey
     traced = [wire for wire in line.conductors if wire.conductor_id != 2]
@@ -130,7 +158,7 @@ def test_points_in_voxels_of_wires_at_a_tower_are_no_obstacles(survey, wires):
 
     def nearest_wire(structures: Structures) -> float:
         """m, planar distance from the tower of the nearest point in a voxel of a wire."""
-        look_up = AreaLookUp(spool, structures, wires, classes=False)
+        look_up = AreaLookUp(spool, structures, wires)
         found = look_up.obstacles(Area(frame, 0.0, span.length, 20.0))
         return float(np.hypot(*(found.xyz[found.wire][:, :2] - (x, y)).T).min())
 

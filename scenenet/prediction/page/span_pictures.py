@@ -100,12 +100,7 @@ def span_pictures(
     if line is None:
         return
     wires = next(each for each in prediction.further if each.used.target.name == WIRES)
-    points = AreaLookUp(
-        prediction.spool,
-        prediction.structures,
-        WireVoxels(wires.search),
-        classes=prediction.scheme is not None,
-    )
+    points = AreaLookUp(prediction.spool, prediction.structures, WireVoxels(wires.search))
     settings = prediction.clearance or ClearanceSettings()
     of_span: dict[int, list[Conductor]] = defaultdict(list)
     for conductor in line.conductors:

@@ -150,6 +150,7 @@ class TileSpool:
     Attributes:
         lattice: of the voxels.
         kind: of their blocks.
+        classified: whether the files keep the class codes of the points.
     """
 
     def __init__(
@@ -166,7 +167,9 @@ class TileSpool:
         self.kind = VOXELS if further is None else further.kind
         self._measured = further is not None and bool(further.measurement)
         self._files: dict[int, list[BlockFile]] = defaultdict(list)
+        self.classified = True
         for file in files:
+            self.classified &= CLASSES in file.kinds
             for code in file.codes(self.kind):
                 self._files[code].append(file)
         self._columns: dict[tuple[int, int], list[int]] = defaultdict(list)

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 
 from scenenet.core.compilation import EXACT
+from scenenet.detection.conductor_rules import POLE_M
 from scenenet.detection.within import within
 
 SLIM = 1 / 8
@@ -35,6 +36,13 @@ MIDDLE = 0.3, 0.9
 SEARCH_RADII = 2.0, 1.5, 1.0
 """Successive search radii for the centre, in multiples of the slim radius. The axis may start on a
 leg or a crossarm."""
+
+POLE_RADII = (2.0,)
+"""The same for a pole, of which ``POLE_M / 2`` is the slim radius: the axis starts on it, and the
+next pole is further away."""
+
+ALONE = 0.5
+"""Smallest share of its levels at which a pole stands free of what is beside it."""
 
 
 @dataclass(frozen=True)
@@ -79,8 +87,35 @@ def centre_body(
     they are slim; otherwise a conductor, a tree or a building touches the body. If no level stands
     free, the axis does not change.
     """
+    slim = max(SLIM_M, SLIM * body.height)
+    return _centre(around, axis, body, voxel_size, slim, SEARCH_RADII)
+
+
+def centre_pole(
+    around: np.ndarray, axis: np.ndarray, body: Body, voxel_size: float
+) -> np.ndarray | None:
+    """Axis (2,) m through the pole on which an axis starts; None if nothing as slim stands there.
+
+    To ``centre_body``, two poles side by side may be the legs of one body between them.
+    """
+    axis, free = _centre(around, axis, body, voxel_size, POLE_M / 2, POLE_RADII)
+    return axis if free >= ALONE else None
+
+
+def _centre(
+    around: np.ndarray,
+    axis: np.ndarray,
+    body: Body,
+    voxel_size: float,
+    slim: float,
+    radii: tuple[float, ...],
+) -> tuple[np.ndarray, float]:
+    """``centre_body`` for a body of a ``slim`` radius in m, looked for within ``radii``, multiples
+    of it."""
     place = *axis.tolist(), body.base
-    east, north, free = _centred(*_columns(around), *place, body.height, voxel_size)
+    east, north, free = _centred(
+        *_columns(around), *place, body.height, voxel_size, slim, np.array(radii)
+    )
     return axis + np.array([east, north]), free
 
 
@@ -195,9 +230,10 @@ def _percentile(values, share):  # pragma: no cover - compiled
 
 
 @numba.njit(**EXACT)
-def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cover - compiled
-    """What ``centre_body`` gives, the axis relative to (``east``, ``north``)."""
-    slim = max(SLIM_M, SLIM * height)
+def _centred(
+    x, y, z, east, north, base, height, voxel_size, slim, radii
+):  # pragma: no cover - compiled
+    """What ``_centre`` gives, the axis relative to (``east``, ``north``)."""
     places = np.empty((len(x), 3))
     n = 0
     for i in range(len(x)):
@@ -210,7 +246,7 @@ def _centred(x, y, z, east, north, base, height, voxel_size):  # pragma: no cove
     places = places[:n]
     level, piece, n_pieces = _pieces(places, voxel_size)
     at_east, at_north, free = 0.0, 0.0, 0.0
-    for multiple in SEARCH_RADII:
+    for multiple in radii:
         reached = np.zeros(n_pieces, np.bool_)
         for i in range(n):
             if within(places[i, 0] - at_east, places[i, 1] - at_north, multiple * slim):

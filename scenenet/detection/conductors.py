@@ -32,6 +32,13 @@ from scenenet.detection.conductor_rules import (
 )
 from scenenet.detection.surroundings import Surroundings
 
+PASS_M = 0.5
+"""m, squares across a span in which a conductor counts once."""
+
+
+def _no_passes() -> np.ndarray:
+    return np.empty((0, 2))
+
 
 @dataclass(frozen=True)
 class Span:
@@ -47,6 +54,8 @@ class Span:
             as seen along the bearing.
         lowest, highest: m, heights of the lowest and the highest one above the foot, at the tower.
         places: (M, 3) m, points on the conductors.
+        passes: (K, 2) m, where conductors pass the axis: to its right, as seen along the bearing,
+            and height above the foot; one for each square of ``PASS_M``.
     """
 
     bearing: float
@@ -58,10 +67,21 @@ class Span:
     lowest: float
     highest: float
     places: np.ndarray = field(repr=False, compare=False)
+    passes: np.ndarray = field(repr=False, compare=False, default_factory=_no_passes)
 
     def without_places(self) -> Span:
         """The same span without the points on its conductors."""
         return replace(self, places=np.empty((0, 3)))
+
+    def without_passes(self) -> Span:
+        """The same span without the places where its conductors pass, one by one."""
+        return replace(self, passes=_no_passes())
+
+    def passes_of(self, offset: np.ndarray) -> Span:
+        """The same span, with ``passes`` at a place (2,) m from the axis."""
+        east, north = np.sin(np.radians(self.bearing)), np.cos(np.radians(self.bearing))
+        right = offset[0] * north - offset[1] * east
+        return replace(self, passes=self.passes - np.array([right, 0.0]))
 
 
 class ConductorPoints:
@@ -170,17 +190,17 @@ def _spans(
         end = distance[_angle(towards, bearing) <= SECTOR].max(initial=NEAR)
         available = max(min(float(end), FAR) - NEAR, MIN_LENGTH)
         rise = float(np.median(slope[members]))
-        attached = _attachments(place[members], s[members], bearing, rise)
+        attached, passes = _attachments(place[members], s[members], bearing, rise)
         followed = min(1.0, length / available)
-        spans.append(Span(bearing, length, followed, rise, *attached, place[members]))
+        spans.append(Span(bearing, length, followed, rise, *attached, place[members], passes))
     return spans
 
 
 def _attachments(
     place: np.ndarray, s: np.ndarray, bearing: float, slope: float
-) -> tuple[float, float, float, float]:
+) -> tuple[tuple[float, float, float, float], np.ndarray]:
     """Where the conductors of a span pass the tower: least and greatest distance to the right of
-    the axis, and least and greatest height, m.
+    the axis, and least and greatest height, m; and all of them (K, 2), as in ``Span.passes``.
 
     Places that continue one another towards the tower are a conductor; treetops are not.
 
@@ -196,7 +216,8 @@ def _attachments(
     continues = np.array([len(np.unique(metre[row])) for row in same])
     conductor = passes[continues >= min(CONTINUES_M, continues.max())]
     (left, lowest), (right, highest) = conductor.min(axis=0), conductor.max(axis=0)
-    return float(left), float(right), float(lowest), float(highest)
+    squares = np.unique(np.round(conductor / PASS_M), axis=0) * PASS_M
+    return (float(left), float(right), float(lowest), float(highest)), squares
 
 
 def _runs(bearing: np.ndarray, s: np.ndarray) -> Iterator[tuple[float, float, np.ndarray]]:

@@ -10,7 +10,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from scenenet.detection.conductor_rules import BESIDE_M, POLE_M, SHORTEST_SPAN_M
+from scenenet.detection.conductor_rules import BESIDE_M, HEAD, POLE_M, SHORTEST_SPAN_M
 from scenenet.detection.joined import PLANE_M, joined, tower_of
 from scenenet.detection.line_frame import across, sides_of
 from scenenet.detection.measured_tower import MeasuredTower
@@ -18,6 +18,10 @@ from scenenet.detection.surroundings import Surroundings
 
 APART_M = 2.0
 """m, smallest distance between two towers, measured in points."""
+
+LEVEL_M, BRACED = 1.0, 0.25
+"""m, height of the levels between two poles, and the share of them up to which there are points,
+of bushes, where no brace is. A lattice has braces at most levels, also with few points."""
 
 CELL_M = 200.0
 """m, edge of the cells in which towers are looked up: nothing here compares towers that are further
@@ -44,6 +48,7 @@ def distinct_towers(found: list[MeasuredTower], points: Surroundings) -> list[Me
         if not any(_same_body(tower, other) for other in kept.near(tower)):
             bodies.append(tower)
             kept.add(tower, tower)
+    bodies = [body for body in bodies if not _is_air_between_poles(body, kept, points)]
     towers: list[MeasuredTower] = []
     best: _Places[MeasuredTower] = _Places()
     # Not the tallest: a tree under conductors seems to reach up to them, as high as the tower does.
@@ -75,9 +80,10 @@ class _Places(Generic[Item]):
         return int(tower.x // CELL_M), int(tower.y // CELL_M)
 
 
-def _best_first(tower: MeasuredTower) -> tuple[float, float, float]:
-    """The key that sorts the body that stands most free first."""
-    return -tower.free * tower.upright * tower.height, tower.x, tower.y
+def _best_first(tower: MeasuredTower) -> tuple[bool, float, float, float]:
+    """The key that sorts the body that stands most free first, and portals before their poles."""
+    portal = tower.structure.apart > 0
+    return not portal, -tower.free * tower.upright * tower.height, tower.x, tower.y
 
 
 def _same_body(one: MeasuredTower, other: MeasuredTower) -> bool:
@@ -98,6 +104,33 @@ def _in_plane(one: MeasuredTower, other: MeasuredTower) -> bool:
     """Whether two bodies stand in one plane across the line, as seen from the first."""
     offset = np.array([other.x - one.x, other.y - one.y])
     return bool(abs(offset @ one.structure.along) <= PLANE_M)
+
+
+def _is_air_between_poles(
+    body: MeasuredTower, others: _Places[MeasuredTower], points: Surroundings
+) -> bool:
+    """Whether a wide body is two poles and the air between them.
+
+    A prism around both has points at every level and none beside it, as that of a lattice has. But
+    a lattice has braces below its crossarms.
+    """
+    if body.width <= POLE_M:
+        return False
+    shape, right = body.structure, across(body.structure.along)
+    poles = [
+        float(np.array([other.x - body.x, other.y - body.y]) @ right)
+        for other in others.near(body)
+        if other.width <= POLE_M and _overlap(body, other) and _in_plane(body, other)
+    ]
+    if not poles or not min(poles) < 0 < max(poles):
+        return False
+    s, t, h = shape.frame(points(np.array([body.x, body.y]), shape.reach))
+    high = HEAD * body.height
+    inside = shape.in_body(s, t, h) & (h <= high)
+    for at in poles:
+        inside &= np.maximum(np.abs(s), np.abs(t - at)) > POLE_M / 2
+    levels = np.unique(np.floor((h[inside] - shape.foot) / LEVEL_M))
+    return bool(len(levels) <= BRACED * (high - shape.foot) / LEVEL_M)
 
 
 def _joined(bodies: list[MeasuredTower], points: Surroundings) -> list[list[MeasuredTower]]:

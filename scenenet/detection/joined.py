@@ -12,9 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from scenenet.detection.conductor_rules import POLE_M
 from scenenet.detection.head import AIR_M, FREE
 from scenenet.detection.line_frame import across, line_frame, sides_of
 from scenenet.detection.portal import BEAM
+from scenenet.detection.side_by_side import hold_together, stand_apart
 from scenenet.detection.structure import Structure
 from scenenet.detection.surroundings import Surroundings
 
@@ -35,12 +37,35 @@ of two towers is more free air than one piece."""
 
 
 def joined(one: Structure, other: Structure, points: Surroundings) -> bool:
-    """Whether a beam leads from one body to the other, as seen from either.
+    """Whether two bodies belong to one tower: a beam leads from one to the other, as seen from
+    either, or conductors show that there is one.
 
     Args:
         points: gives the points around a position.
     """
+    if one.apart or other.apart:
+        return _is_pole_of(one, other) or _is_pole_of(other, one)
+    if max(one.profile.width, other.profile.width) <= POLE_M:
+        if _hold_together(one, other) or _hold_together(other, one):
+            return True
+        apart = float(np.hypot(one.x - other.x, one.y - other.y))
+        if stand_apart(one.spans, other.spans, apart):
+            return False
     return _leads(one, other, points) or _leads(other, one, points)
+
+
+def _hold_together(one: Structure, other: Structure) -> bool:
+    """Whether two poles in the plane of the first hold their conductors together."""
+    away = _across(one, other)
+    if away is None or abs(away) > REACH * max(one.height, other.height):
+        return False
+    return hold_together(one.spans, other.spans, one.along, away)
+
+
+def _is_pole_of(portal: Structure, other: Structure) -> bool:
+    """Whether a body is one of the two of a portal."""
+    away = _across(portal, other)
+    return away is not None and abs(abs(away) - portal.apart) <= PLANE_M
 
 
 def _leads(one: Structure, other: Structure, points: Surroundings) -> bool:
@@ -78,12 +103,16 @@ def tower_of(bodies: Sequence[Structure]) -> Structure:
     """The tower that joined bodies belong to.
 
     It is the body that is nearest to the middle of their conductors and crossarms. Two legs without
-    one between them are the two bodies of a portal.
+    one between them are the two bodies of a portal, and so are two poles.
     """
     first = bodies[0]
+    for body in bodies:
+        if body.apart:
+            return body
     right = across(first.along)
     at = [float(np.array([b.x - first.x, b.y - first.y]) @ right) for b in bodies]
-    if len(bodies) == 2 and abs(at[1]) > LEGS * first.height:
+    poles = max(body.profile.width for body in bodies) <= POLE_M
+    if len(bodies) == 2 and (poles or abs(at[1]) > LEGS * first.height):
         return _portal(first, bodies[1], at[1])
     passes = [
         place + side

@@ -20,8 +20,9 @@ from scenenet.detection.line_frame import (
     sides_of,
     unit,
 )
-from scenenet.detection.portal import find_twin
+from scenenet.detection.portal import find_twins
 from scenenet.detection.profile import GAP_M, SCRUB_M, SHIFT_M, Profile, fit_profile, furthest
+from scenenet.detection.side_by_side import hold_together, stand_apart
 from scenenet.detection.structure import MARGIN_M, BodyTests, Structure
 
 FOOT_M = 0.5
@@ -107,7 +108,13 @@ def measure_structure(
     body = _measure_body(points, start, direction_of(spans), tall, shift)
     if body is None or not tests.passed(body):
         return None
-    return _with_head(_with_twin(body, points), points, spans, axis)
+    # The frame of the spans is the axis at which they were looked for.
+    spans = tuple(span.passes_of(np.array([body.x, body.y]) - axis) for span in spans)
+
+    def beside(away: np.ndarray) -> tuple[Span, ...]:
+        return tuple(leaving(np.array([body.x, body.y]) + away, base, top, crossarm))
+
+    return _with_head(_with_twin(body, points, spans, beside), points, spans, axis)
 
 
 def _measure_body(
@@ -137,12 +144,27 @@ def _measure_body(
     return Structure(x, y, ground, top, foot, along, profile, upright, NO_HEAD, ())
 
 
-def _with_twin(body: Structure, points: np.ndarray) -> Structure:
-    """The body, or both bodies of a portal."""
+def _with_twin(
+    body: Structure,
+    points: np.ndarray,
+    spans: tuple[Span, ...],
+    beside: Callable[[np.ndarray], tuple[Span, ...]],
+) -> Structure:
+    """The body, or both bodies of a portal.
+
+    Args:
+        spans: the conductors at the body.
+        beside: gives those at a place (2,) m from it.
+    """
     axis = np.array([body.x, body.y])
     s, t, h = line_frame(points, axis, body.along, body.ground, SCRUB_M)
-    at = find_twin(s, t, h, body.profile, body.height)
-    if at is None:
+    for at, beam in find_twins(s, t, h, body.profile, body.height):
+        others = beside(at * across(body.along))
+        if hold_together(spans, others, body.along, at):
+            break
+        if beam and not stand_apart(spans, others, abs(at)):
+            break
+    else:
         return body
     away = at / 2 * across(body.along)
     x, y = (axis + away).tolist()

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenenet.detection.conductor_rules import POLE_M
 from scenenet.detection.conductors import Span
 from scenenet.detection.rough import RoughTower
 from scenenet.detection.structure import Structure
@@ -47,8 +48,12 @@ class MeasuredTower:
         """A tower that was found at a rough one, with the conductors that lead on.
 
         Their points are no longer needed: a long line has too many to keep those of all towers.
+        Where they pass one by one matters beside another pole.
         """
-        structure = replace(structure, spans=tuple(s.without_places() for s in structure.spans))
+        own = tuple(span.without_places() for span in structure.spans)
+        if structure.apart or structure.profile.width > POLE_M:
+            own = tuple(span.without_passes() for span in own)
+        structure = replace(structure, spans=own)
         return cls(
             x=structure.x,
             y=structure.y,
@@ -57,7 +62,7 @@ class MeasuredTower:
             width=structure.profile.width,
             free=structure.profile.free,
             upright=structure.upright,
-            spans=tuple(span.without_places() for span in spans),
+            spans=tuple(span.without_places().without_passes() for span in spans),
             probability=rough.probability,
             place=np.array([rough.place_x, rough.place_y]),
             reach=rough.reach,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from scenenet.detection.head import AIR_M, ARM_M
 from scenenet.detection.profile import SCRUB_M, Profile, fit_profile
 
-TWIN = 0.25
-"""Largest distance between the poles of a portal as a share of the height; the poles of two lines
-are further apart."""
+TWIN = 0.35
+"""Largest distance between the poles of a portal as a share of the height: poles of 20 m stand up
+to 6.4 m apart."""
 
 TWIN_WIDTH_M = 0.6
 """m, largest half width of a pole of a portal."""
@@ -28,10 +30,11 @@ STEP_M = 0.2
 """m, distance between the places at which a second pole is looked for."""
 
 
-def find_twin(
+def find_twins(
     s: np.ndarray, t: np.ndarray, h: np.ndarray, profile: Profile, height: float
-) -> float | None:
-    """m to the right of the axis, where the second pole of a portal stands; None without one.
+) -> Iterator[tuple[float, bool]]:
+    """m to the right of the axis, where the second pole of a portal may stand, and whether a beam
+    leads there.
 
     Args:
         s, t, h: (N,) m, points in the frame of the tower: along the line, to its right, up.
@@ -39,7 +42,7 @@ def find_twin(
         height: m, of the first pole.
     """
     if profile.foot > TWIN_WIDTH_M:
-        return None
+        return
     for at in _upright_places(s, t, h, profile.level, height):
         # Further away, the first pole may stand more free.
         twin = fit_profile(s, t - at, h, height, TWIN_WIDTH_M / 2)
@@ -47,9 +50,8 @@ def find_twin(
             continue
         place = at + twin.t
         slim_and_free = twin.free >= TWIN_FREE and twin.foot <= TWIN_WIDTH_M
-        if slim_and_free and _beam(s, t, h, place, height):
-            return place
-    return None
+        if slim_and_free:
+            yield place, _beam(s, t, h, place, height)
 
 
 def _upright_places(

@@ -12,13 +12,14 @@ from typing import overload
 import numpy as np
 
 from scenenet.core.progress import labelled, track_if
-from scenenet.detection.body import centre_body, measure_body
+from scenenet.detection.body import centre_body, centre_pole, measure_body
 from scenenet.detection.candidates import (
     SURROUNDINGS_M,
     DistinctPlaces,
     axes,
     neighbours_adjacent,
 )
+from scenenet.detection.conductor_rules import POLE_M
 from scenenet.detection.detected_voxels import DetectedSurvey
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import Surroundings
@@ -90,23 +91,23 @@ def rough_towers(
     offset = detected.offset
     label = labelled(progress, "areas searched")
     searched = neighbours_adjacent(axes(detected, settings, settings.eps / 2, label))
-    rows = np.full((len(searched), len(fields(RoughTower))), np.nan)
+    rows = np.full((len(searched), 2, len(fields(RoughTower))), np.nan)
     # Block by block, because ``detected`` has not all in memory.
     order = np.lexsort((np.arange(len(searched)), *(searched // BLOCK_M).T))
     for row in track_if(order, labelled(progress, "places looked at")):
         axis = searched[row]
         around = surroundings(axis + offset[:2], SURROUNDINGS_M) - offset
-        tower = _measure(detected, axis, around, settings)
-        if tower is not None:
-            rows[row] = astuple(tower)
-    rows, places = rows[~np.isnan(rows[:, 0])], DistinctPlaces()
+        for number, tower in enumerate(_measure(detected, axis, around, settings)):
+            rows[row, number] = astuple(tower)
+    rows, places = rows[~np.isnan(rows[..., 0])], DistinctPlaces()
     return RoughTowers(rows[[places.add(x, y) for x, y in rows[:, :2].tolist()]])
 
 
 def _measure(
     detected: DetectedSurvey, axis: np.ndarray, around: np.ndarray, settings: DetectionSettings
-) -> RoughTower | None:
-    """The rough tower on an axis (2,) m, or None if there is none.
+) -> list[RoughTower]:
+    """The rough towers on an axis (2,) m: one whose body is around it, and a pole that stands on it
+    where the middle of that body is elsewhere, between two poles.
 
     Args:
         around: (M, 3) m, centres of the occupied voxels within ``SURROUNDINGS_M``.
@@ -117,17 +118,21 @@ def _measure(
     seen = voxels.within(axis, settings.eps / 2)
     body = measure_body(around, axis, voxels.z[seen], foot_radius, size)
     if body.height < min_height:
-        return None
+        return []
     # The reach of the crossarms follows from the height.
     crossarm = max(settings.eps / 2, settings.crossarm * body.height)
     voxels = detected.around(axis, crossarm)
-    place, seen = axis, voxels.within(axis, crossarm)
-    axis, free = centre_body(around, axis, body, size)
-    if not free:
-        return None
-    body = measure_body(around, axis, voxels.z[seen], foot_radius, size)
-    if body.height < min_height or body.upright < min_upright:
-        return None
+    seen = voxels.within(axis, crossarm)
     peak = float(voxels.probability[seen].max())
-    (x, y), (place_x, place_y) = axis.tolist(), place.tolist()
-    return RoughTower(x, y, body.base, body.height, peak, place_x, place_y, crossarm)
+    middle, free = centre_body(around, axis, body, size)
+    centres = [middle] if free else []
+    if not free or np.hypot(*(middle - axis)) > POLE_M:
+        pole = centre_pole(around, axis, body, size)
+        centres += [] if pole is None else [pole]
+    found = []
+    for x, y in centres:
+        body = measure_body(around, np.array([x, y]), voxels.z[seen], foot_radius, size)
+        if body.height >= min_height and body.upright >= min_upright:
+            place = float(axis[0]), float(axis[1]), crossarm
+            found.append(RoughTower(float(x), float(y), body.base, body.height, peak, *place))
+    return found

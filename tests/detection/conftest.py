@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from fixtures.scenes import PLACE, conductor_places
 
-from scenenet.synthetic.scene.towers import KINDS, place, sample
+from scenenet.synthetic.scene.towers import KINDS, Size, place, sample
 
 TOWER, CONDUCTOR, GROUND, TREE = 15, 16, 2, 5
 
@@ -37,6 +37,8 @@ def make_tower_scene(
     bearing: float = 30.0,
     *,
     density: float = 10.0,
+    circuits: int = 1,
+    width: float | None = None,
     slope: float = 0.0,
     ground: bool = True,
     bearings: tuple[float, ...] | None = None,
@@ -48,12 +50,13 @@ def make_tower_scene(
 
     Args:
         density: points per m2 of surface of its members.
+        width: m, of its body, or between the poles of a portal; None for that of its kind.
         slope: rise of the ground per m eastwards.
         bearings: of the conductors; along the line on both sides if None.
         trees: x and y relative to the foot and height of each, m.
     """
     rng = np.random.default_rng(seed)
-    structure = KINDS[kind](height, 1, 0)
+    structure = KINDS[kind](height, circuits, 0, Size(width))
     azimuth = np.radians(90 - bearing)
     parts = [(place(sample(structure.members, density, rng), 0, 0, 0, azimuth), TOWER)]
     ends = place(structure.attachments, 0, 0, 0, azimuth)

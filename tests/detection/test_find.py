@@ -90,6 +90,47 @@ def test_two_towers_six_metres_apart_are_two(tower_scene):
     assert places[1] == pytest.approx(other.foot[:2], abs=0.3)
 
 
+@pytest.mark.parametrize("apart", [4.5, 5.5, 6.4])
+def test_the_middle_between_two_poles_does_not_hide_them(tower_scene, apart):
+    """Seen from either pole, the other may be a leg of a tower whose axis is between them."""
+    one, other = pair(tower_scene, apart, 22.0, density=3.0)
+    towers = find(np.concatenate([one.xyz, other.xyz]), [one.foot, other.foot], height=20.0)
+    places = sorted((tower.x, tower.y) for tower in towers)
+    assert len(places) == 2
+    assert places[0] == pytest.approx(one.foot[:2], abs=0.3)
+    assert places[1] == pytest.approx(other.foot[:2], abs=0.3)
+
+
+def pair(tower_scene, apart, height, **changes):
+    """Two poles ``apart`` m across their lines, which lead to the north."""
+    one = tower_scene("wooden", height, 0.0, **changes)
+    foot = (one.foot[0] + apart, one.foot[1], one.foot[2])
+    return one, tower_scene("wooden", height, 0.0, ground=False, seed=1, foot=foot, **changes)
+
+
+@pytest.mark.parametrize("height", [18.0, 24.0])
+def test_conductors_from_pole_to_pole_do_not_make_a_portal(tower_scene, height):
+    one, other = pair(tower_scene, 6.0, height, circuits=2)
+    t = np.arange(0, 6, 0.1)
+    across = [
+        one.foot + np.column_stack([t, np.zeros(len(t)), np.full(len(t), height - down)])
+        for down in (0.2, 1.9, 3.5)
+    ]
+    xyz = np.concatenate([one.xyz, other.xyz, *across])
+    assert len(find(xyz, [one.foot, other.foot], height=height - 2)) == 2
+
+
+@pytest.mark.parametrize(("height", "width"), [(12.0, 3.0), (16.0, 5.0), (20.0, 6.4), (24.0, 6.0)])
+@pytest.mark.parametrize("detected", [(-1,), (-1, 1)])
+def test_a_portal_of_few_points_is_one_tower(tower_scene, height, width, detected):
+    """Points on its beam have gaps; the conductor in the middle shows that there is one."""
+    scene = tower_scene("h_frame", height, 0.0, density=3.0, width=width)
+    feet = [scene.foot + np.array([side * width / 2, 0, 0]) for side in detected]
+    (tower,) = find(scene.xyz, feet, height=height - 2)
+    assert np.hypot(tower.x - scene.foot[0], tower.y - scene.foot[1]) < 0.3
+    assert tower.structure.apart == pytest.approx(width / 2, abs=0.3)
+
+
 def test_a_portal_is_one_tower(tower_scene):
     scene = tower_scene("h_frame", 18.0)
     across = 1.8 * np.array([np.sin(np.radians(120)), np.cos(np.radians(120)), 0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -15,6 +16,7 @@ from scenenet.detection.conductor_rules import (
     LINE_CELL_M,
     LINE_M,
     RISE,
+    RISE_OVER_GROUND,
     TESTED_CELL_M,
 )
 from scenenet.detection.surroundings import Surroundings
@@ -26,9 +28,25 @@ BLOCK_M, BLOCKS_KEPT = 32.0, 256
 GROUND = 5
 """Percentile of the elevations in a block that counts as its ground."""
 
-Block = tuple[np.ndarray, np.ndarray, np.ndarray]
-"""Positions (M, 3) m and directions (M, 3) of the points on conductors, and positions (N, 3) m of
-other points that were tested."""
+SLOPE_CELL_M, SLOPE_M, SLOPE_SEEN = 4.0, 3.0, 0.7
+"""m, edge of the cells whose lowest points show the slope of the ground in a block, m that they may
+be off a plane, and the smallest share of them that is not further off. A hillside curves by as much
+over a block; the lowest points at a house are on its roof and beside it."""
+
+
+class Block(NamedTuple):
+    """What is known of a block.
+
+    Attributes:
+        places, directions: (M, 3) m, points on conductors, and (M, 3) unit vectors along them.
+        others: (N, 3) m, other points that were tested.
+        rise: steepest slope of a conductor there.
+    """
+
+    places: np.ndarray
+    directions: np.ndarray
+    others: np.ndarray
+    rise: float
 
 
 class ConductorBlocks:
@@ -52,12 +70,13 @@ class ConductorBlocks:
         """What is within a radius in m of a place (2,) m."""
         blocks = [self._block(number) for number in _numbers(place, radius)]
         found = [block.result() for block in blocks]
-        inside = [_within(places, *place, radius) for places, _, _ in found]
-        beside = [_within(others, *place, radius) for _, _, others in found]
-        return (
-            np.concatenate([block[0][rows] for block, rows in zip(found, inside, strict=True)]),
-            np.concatenate([block[1][rows] for block, rows in zip(found, inside, strict=True)]),
-            np.concatenate([block[2][rows] for block, rows in zip(found, beside, strict=True)]),
+        inside = [_within(block.places, *place, radius) for block in found]
+        beside = [_within(block.others, *place, radius) for block in found]
+        return Block(
+            np.concatenate([b.places[rows] for b, rows in zip(found, inside, strict=True)]),
+            np.concatenate([b.directions[rows] for b, rows in zip(found, inside, strict=True)]),
+            np.concatenate([b.others[rows] for b, rows in zip(found, beside, strict=True)]),
+            max(block.rise for block in found),
         )
 
     def _block(self, number: tuple[int, int]) -> Future[Block]:
@@ -76,16 +95,29 @@ class ConductorBlocks:
         middle = (np.array([x, y]) + 0.5) * BLOCK_M
         near = self._points(middle, BLOCK_M / np.sqrt(2) + LINE_M)
         if len(near) == 0:
-            return np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3))
+            return Block(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3)), RISE)
+        rise = max(RISE, _slope(near) + RISE_OVER_GROUND)
         ground = np.percentile(near[:, 2], GROUND)
         above = near[:, 2] - ground
-        near = near[(above >= self._lowest - RISE * LINE_M) & (above <= HIGHEST_M)]
+        near = near[(above >= self._lowest - rise * LINE_M) & (above <= HIGHEST_M)]
         near = near[_one_per_cell(near, LINE_CELL_M)]
         tested = _one_per_cell(near, TESTED_CELL_M)
         inside = np.abs(near[tested, :2] - middle).max(axis=1) <= BLOCK_M / 2
         tested = tested[inside & (near[tested, 2] >= ground + self._lowest)]
-        rows, directions = points_on_lines(near, tested)
-        return near[rows], directions, near[np.setdiff1d(tested, rows)]
+        rows, directions = points_on_lines(near, tested, rise)
+        return Block(near[rows], directions, near[np.setdiff1d(tested, rows)], rise)
+
+
+def _slope(points: np.ndarray) -> float:
+    """Slope of the ground below points (N, 3) m; 0 where they show none."""
+    cells = np.floor(points[:, :2] / SLOPE_CELL_M).astype(np.int64)
+    order = np.lexsort((points[:, 2], cells[:, 1], cells[:, 0]))
+    first = np.append(True, (np.diff(cells[order], axis=0) != 0).any(axis=1))
+    low = points[order[first]] - points.mean(axis=0)
+    design = np.column_stack([low[:, :2], np.ones(len(low))])
+    plane = np.linalg.lstsq(design, low[:, 2], rcond=None)[0]
+    on_plane = np.abs(low[:, 2] - design @ plane) <= SLOPE_M
+    return float(np.hypot(plane[0], plane[1])) if on_plane.mean() >= SLOPE_SEEN else 0.0
 
 
 def _numbers(place: np.ndarray, radius: float) -> Iterator[tuple[int, int]]:

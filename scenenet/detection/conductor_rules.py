@@ -27,6 +27,10 @@ of a tower reaches."""
 RISE = 0.5
 """Steepest slope of a conductor; at the head of a tower on a slope it is about a third."""
 
+RISE_OVER_GROUND = 0.15
+"""Steepest slope of a conductor beyond that of the ground, where that is steep: half the sag of a
+span, over a quarter of its length. Guys and jibs are steeper where the ground is level."""
+
 SECTOR = 15.0
 """Largest difference in degrees between the bearings within a span: conductors diverge from the
 head to the crossarms of the next tower."""

@@ -113,11 +113,13 @@ class ConductorPoints:
                 have no conductor, and it is not looked up there.
         """
         foot = np.array([*axis, base])
-        places, directions, others = self._blocks.near(axis, _reach(crossarm))
+        places, directions, others, rise = self._blocks.near(axis, _reach(crossarm))
         offset = places - foot
         distance = np.hypot(offset[:, 0], offset[:, 1])
-        here = (distance >= NEAR) & (offset[:, 2] >= HEAD * height)
-        here &= offset[:, 2] <= height + RISE * distance
+        # Down a steep slope, conductors pass below the head of the tower that they leave.
+        lowest = HEAD * height - (rise - RISE) * distance
+        here = (distance >= NEAR) & (offset[:, 2] >= lowest)
+        here &= offset[:, 2] <= height + rise * distance
         if not here.any():
             return []
         level = np.hypot(directions[here, 0], directions[here, 1])

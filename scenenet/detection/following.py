@@ -13,6 +13,7 @@ from scenenet.detection.conductor_rules import (
     FAR,
     FURTHEST_M,
     MISSED_M,
+    RISE,
     SIDE_M,
     STEP_M,
     SUPPORT,
@@ -46,7 +47,10 @@ def leads_on(span: Span, axis: np.ndarray, base: float, occupied: np.ndarray, si
     ahead = (s > end - STEP_M) & (t >= left - FAR) & (t <= right + FAR)
     s, t, z = s[ahead], t[ahead], z[ahead]
     place = end
+    # Steep ones would leave the corridor, which moves by half of what it sees.
+    climb = span.slope * STEP_M if abs(span.slope) > RISE else 0.0
     while place - end < MISSED_M and end < FURTHEST_M:
+        low, high = low + climb, high + climb
         piece = (s > place) & (s <= place + STEP_M)
         grow = SIDE_M * (1 + (place - end) / MISSED_M)
         here = (

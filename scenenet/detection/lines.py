@@ -82,7 +82,9 @@ class Grid(NamedTuple):
     starts: np.ndarray
 
 
-def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def points_on_lines(
+    points: np.ndarray, tested: np.ndarray, rise: float = RISE
+) -> tuple[np.ndarray, np.ndarray]:
     """The tested points that lie on a thin, nearly level line.
 
     Memory grows with the volume of the bounding box of the points, 8 bytes for each m3.
@@ -90,6 +92,7 @@ def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray,
     Args:
         points: (N, 3) m.
         tested: (M,) rows of the points to test.
+        rise: steepest slope of a line.
 
     Returns:
         rows (K,) of ``points``, and unit vectors (K, 3) along the lines.
@@ -97,12 +100,13 @@ def points_on_lines(points: np.ndarray, tested: np.ndarray) -> tuple[np.ndarray,
     if len(tested) == 0:
         return np.empty(0, np.int64), np.empty((0, 3))
     grid, cells = _grid(points)
+    line = LINE._replace(rise=rise)
     step = len(tested) // SAMPLE
     if step > 1:
         few = tested[::step]
-        if not _in_threads(grid, points[few], cells[few])[0].any():
+        if not _in_threads(grid, points[few], cells[few], line)[0].any():
             return np.empty(0, np.int64), np.empty((0, 3))
-    on_line, direction = _in_threads(grid, points[tested], cells[tested])
+    on_line, direction = _in_threads(grid, points[tested], cells[tested], line)
     rows, direction = tested[on_line], direction[on_line]
     same = _continued(points[rows], direction)
     return rows[same], direction[same]
@@ -120,7 +124,9 @@ def _grid(points: np.ndarray) -> tuple[Grid, np.ndarray]:
     return Grid(x, y, z, origin, shape, starts), cells
 
 
-def _in_threads(grid: Grid, places: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _in_threads(
+    grid: Grid, places: np.ndarray, cells: np.ndarray, line: Line
+) -> tuple[np.ndarray, np.ndarray]:
     """``_on_lines`` with a share of the places for each processor."""
     threads = numba.get_num_threads()
     shares = zip(
@@ -129,7 +135,7 @@ def _in_threads(grid: Grid, places: np.ndarray, cells: np.ndarray) -> tuple[np.n
         strict=True,
     )
     with ThreadPoolExecutor(threads) as pool:
-        parts = list(pool.map(lambda share: _on_lines(grid, *share, LINE), shares))
+        parts = list(pool.map(lambda share: _on_lines(grid, *share, line), shares))
     found, direction = zip(*parts, strict=True)
     return np.concatenate(found), np.concatenate(direction)
 

@@ -63,3 +63,10 @@ def test_a_conductor_over_a_slope_is_followed(points):
     line = points.conductors(90, HEIGHT, end=75.0)
     line[:, 2] += 0.2 * (line[:, 0] - points.place[0])
     assert leads(points, points.ground(100, slope=0.2), line) == [True]
+
+
+@pytest.mark.parametrize("climb", [-0.9, 0.9])
+def test_a_conductor_up_or_down_a_steep_slope_leads_on(points, climb):
+    line = points.conductors(90, HEIGHT, end=75.0)
+    line[:, 2] += climb * (line[:, 0] - points.place[0] - 0.5)
+    assert leads(points, points.ground(100, slope=climb), line) == [True]

@@ -45,6 +45,28 @@ def spans(*parts, crossarm=5.0, height=HEIGHT):
     return ConductorPoints(around, 4.5).leaving(AXIS, 0.0, height, crossarm, around)
 
 
+@pytest.mark.parametrize(("slope", "found"), [(0.9, [(270, -0.8), (90, 0.8)]), (0.0, [])])
+def test_conductors_are_as_steep_as_the_ground_and_guys_are_steeper(slope, found):
+    hill = ground(20_000)
+    hill[:, 2] += slope * (hill[:, 0] - AXIS[0])
+    line = [
+        conductor(t, 17, bearing=b, rise=r) for t in (-1, 1) for b, r in ((90, 0.8), (270, -0.8))
+    ]
+    points = np.concatenate([hill, *line])
+    around = surroundings_in(points)
+    seen = ConductorPoints(around, 4.5).leaving(AXIS, 0.0, HEIGHT, 5.0, around)
+    assert [(round(span.bearing), round(span.slope, 1)) for span in seen] == found
+    assert [span.followed for span in seen] == [1.0] * len(found)
+
+
+def test_a_house_is_not_steep_ground():
+    roof = ground(20_000)
+    roof[:, 2] += np.where(roof[:, 0] > AXIS[0], 20.0, 0.0)
+    line = [conductor(t, 17, bearing=270, rise=0.8) for t in (-1, 1)]
+    around = surroundings_in(np.concatenate([roof, *line]))
+    assert ConductorPoints(around, 4.5).leaving(AXIS, 0.0, HEIGHT, 5.0, around) == []
+
+
 @pytest.mark.parametrize("spacing", [0.05, 0.3, 1.2, 2.0])
 def test_a_conductor_is_found_at_any_density(spacing):
     (span,) = spans(conductor(1.5, 17, spacing=spacing))

@@ -69,19 +69,20 @@ class Structure:
     def carries(self, length: float) -> bool:
         """Whether it carries conductors of this ``length``, the sum of ``Span.followed``.
 
-        The lowest is not above its top, the highest is near that of its body, and they pass the
-        axis on both sides, or close to it on one.
+        In each direction the lowest is not above its top, and the highest is near that of its body.
+        They pass the axis on both sides, or close to it on one.
         """
         if length == 0:
             return True
-        if sum(span.followed for span in self.spans) < length:
-            return False
-        if min(span.lowest for span in self.spans) > self.height + OVER_M:
-            return False
         top = min(self.height, self.body_top)
-        if max(span.highest for span in self.spans) < UNDER_TOP * top:
+        attached = tuple(
+            span
+            for span in self.spans
+            if span.lowest <= self.height + OVER_M and span.highest >= UNDER_TOP * top
+        )
+        if sum(span.followed for span in attached) < length:
             return False
-        sides = sides_of(self.spans, self.along)
+        sides = sides_of(attached, self.along)
         limit = BESIDE_M if 2 * self.profile.top <= POLE_M else BESIDE * self.height
         return max(min(sides), -max(sides)) <= limit
 

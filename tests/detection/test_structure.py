@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from scenenet.detection.conductor_rules import WIDE
-from scenenet.detection.conductors import ConductorPoints
+from scenenet.detection.conductors import ConductorPoints, Span
 from scenenet.detection.measure_structure import measure_structure
 from scenenet.detection.structure import BodyTests
 from scenenet.detection.structure_record import from_record, to_record
@@ -175,3 +176,14 @@ def test_the_axis_of_a_window_tower_is_amid_its_conductors(tower_scene, away):
     precision, recall = points_score(shape, scene)
     assert precision > 0.9
     assert recall > 0.6  # its legs end above the conductors, where nothing shows a head
+
+
+def test_a_cable_below_and_conductors_above_a_tree_are_not_attached_to_it(tower_scene):
+    """The cable is of another line; neither passes where a tower so high holds any."""
+    shape = measured(tower_scene("tubular", 18.0), 20)
+    at = {"length": 17.0, "followed": 1.0, "slope": 0.0, "places": np.empty((0, 3))}
+    cable = Span(bearing=30.0, left=-1, right=1, lowest=9.5, highest=10, **at)
+    above = Span(bearing=210.0, left=-1, right=1, lowest=24, highest=25, **at)
+    own = Span(bearing=210.0, left=-1, right=1, lowest=9.5, highest=18, **at)
+    assert not replace(shape, spans=(cable, above)).carries(0.75)
+    assert replace(shape, spans=(cable, own)).carries(0.75)

@@ -78,10 +78,10 @@ class Span:
         return replace(self, passes=_no_passes())
 
     def passes_of(self, offset: np.ndarray) -> Span:
-        """The same span, with ``passes`` at a place (2,) m from the axis."""
+        """The same span, with ``passes`` at a place (3,) m from the foot on the axis."""
         east, north = np.sin(np.radians(self.bearing)), np.cos(np.radians(self.bearing))
         right = offset[0] * north - offset[1] * east
-        return replace(self, passes=self.passes - np.array([right, 0.0]))
+        return replace(self, passes=self.passes - np.array([right, offset[2]]))
 
 
 class ConductorPoints:

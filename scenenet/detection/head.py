@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenenet.detection.conductor_rules import POLE_M
-from scenenet.detection.profile import Profile
+from scenenet.detection.profile import FORK, Profile
 
 ARM_M = 0.35
 """m, smallest half thickness of a crossarm along the line."""
@@ -49,11 +49,6 @@ fullest step. Both faces of a truss have as many; twigs beside it have few."""
 PEAK = 0.4
 """Largest rise of the legs of a window above the conductors that were seen, as a share of the
 height so far. Earth wires on their tops are thin and often not seen; the body ends at the beam."""
-
-FORK = 0.35
-"""Share of the height above which legs of a window, or braces of a portal, carry the crossarms. The
-conductor in the window needs its clearance, which leaves less than two thirds for it and more than
-a third for the body below."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,8 @@ import numpy as np
 from scenenet.detection.conductor_rules import WINDOW_M
 from scenenet.detection.conductors import Span
 from scenenet.detection.ground import fit_ground
-from scenenet.detection.head import FORK, NO_HEAD, find_head
+from scenenet.detection.head import NO_HEAD, find_head
+from scenenet.detection.joined import LEGS
 from scenenet.detection.line_frame import (
     across,
     direction_of,
@@ -21,7 +22,15 @@ from scenenet.detection.line_frame import (
     unit,
 )
 from scenenet.detection.portal import find_twins
-from scenenet.detection.profile import GAP_M, SCRUB_M, SHIFT_M, Profile, fit_profile, furthest
+from scenenet.detection.profile import (
+    FORK,
+    GAP_M,
+    SCRUB_M,
+    SHIFT_M,
+    Profile,
+    fit_profile,
+    furthest,
+)
 from scenenet.detection.side_by_side import hold_together, stand_apart
 from scenenet.detection.structure import MARGIN_M, BodyTests, Structure
 
@@ -55,6 +64,9 @@ AMID_SHIFT_M = 1.0
 """m, largest distance of the axis of a window tower from the middle of its conductors, where they
 leave in two directions. Further away is one of its legs."""
 
+UNDER_BEAM_M = 1.0
+"""m, smallest distance of a conductor in a window below the top of the body, which is the beam that
+it hangs from."""
 
 Leaving = Callable[[np.ndarray, float, float, float], Sequence[Span]]
 """The conductors that leave a tower, from its axis (2,), the elevation of its foot, its height, and
@@ -106,15 +118,27 @@ def measure_structure(
     tall = height if first is None else first.height + 1
     shift = AMID_SHIFT_M if amid and len(spans) > 1 else SHIFT_M
     body = _measure_body(points, start, direction_of(spans), tall, shift)
-    if body is None or not tests.passed(body):
+    if body is None or not (tests.passed(body) or (amid and tests.passed_below_window(body))):
         return None
     # The frame of the spans is the axis at which they were looked for.
-    spans = tuple(span.passes_of(np.array([body.x, body.y]) - axis) for span in spans)
+    place = np.array([body.x, body.y, body.ground.elevation])
+    spans = tuple(span.passes_of(place - [*axis, base]) for span in spans)
 
     def beside(away: np.ndarray) -> tuple[Span, ...]:
-        return tuple(leaving(np.array([body.x, body.y]) + away, base, top, crossarm))
+        return tuple(leaving(place[:2] + away, base, top, crossarm))
 
-    return _with_head(_with_twin(body, points, spans, beside), points, spans, axis)
+    whole = _with_head(_with_twin(body, points, spans, beside), points, spans, axis)
+    return whole if tests.passed(body) or _has_window(whole) else None
+
+
+def _has_window(tower: Structure) -> bool:
+    """Whether a conductor passes below the top of a tower, nearer to its axis than legs of a window
+    are, under crossarms that reach as far to both sides."""
+    if not tower.head.is_even(tower.profile.width / 2):
+        return False
+    passes = np.concatenate([np.empty((0, 2)), *(span.passes for span in tower.spans)])
+    through = np.abs(passes[:, 0]) < LEGS / 2 * tower.height
+    return bool((passes[through, 1] <= tower.body_top - UNDER_BEAM_M).any())
 
 
 def _measure_body(

@@ -36,6 +36,11 @@ WIDTHS_M = (0.3, 0.45, 0.7, 1.0, 1.5, 2.0, 2.75, 3.5, 4.5, 6.0, 8.0)
 SHIFT_M = 2.5
 """m, largest distance of the axis from the approximate one."""
 
+FORK = 0.35
+"""Share of the height above which legs of a window, or braces of a portal, carry the crossarms. The
+conductor in the window needs its clearance, which leaves less than two thirds for it and more than
+a third for the body below."""
+
 GAP_M, GAP_SHARE = 0.6, 0.2
 """Width of the free air around a body: m, and as a share of the half width."""
 
@@ -63,6 +68,7 @@ class Profile:
         height: m above the ground at which the half width is ``top``.
         free: share of the levels that stand free.
         level: m, height of a level.
+        free_below: share of the levels below ``FORK`` of the height that stand free.
     """
 
     s: float
@@ -72,6 +78,7 @@ class Profile:
     height: float
     free: float
     level: float
+    free_below: float = 0.0
 
     def half_width(self, h: np.ndarray) -> np.ndarray:
         """(N,) m at heights (N,) m above the ground."""
@@ -129,9 +136,14 @@ def fit_profile(
         if np.abs(move).max() < 0.02:
             break
     levels = np.arange(len(free)) * level
-    counted = free[levels >= SCRUB_M]
-    share = float(counted.mean()) if len(counted) else 0.0
-    return Profile(float(at[0]), float(at[1]), foot, top, height, share, level)
+    share, below = (
+        float(counted.mean()) if len(counted) else 0.0
+        for counted in (
+            free[levels >= SCRUB_M],
+            free[(levels >= SCRUB_M) & (levels < FORK * height)],
+        )
+    )
+    return Profile(float(at[0]), float(at[1]), foot, top, height, share, level, below)
 
 
 def _search(

@@ -125,8 +125,11 @@ class BodyTests:
     free: float
 
     def passed(self, body: Structure) -> bool:
-        return (
-            body.height >= self.height
-            and body.upright >= self.upright
-            and body.profile.free >= self.free
-        )
+        return self._stands(body) and body.profile.free >= self.free
+
+    def passed_below_window(self, body: Structure) -> bool:
+        """Whether what stands below the window of a tower is its body. In the window is air."""
+        return self._stands(body) and body.profile.free_below >= self.free
+
+    def _stands(self, body: Structure) -> bool:
+        return body.height >= self.height and body.upright >= self.upright

@@ -187,3 +187,18 @@ def test_a_cable_below_and_conductors_above_a_tree_are_not_attached_to_it(tower_
     own = Span(bearing=210.0, left=-1, right=1, lowest=9.5, highest=18, **at)
     assert not replace(shape, spans=(cable, above)).carries(0.75)
     assert replace(shape, spans=(cable, own)).carries(0.75)
+
+
+@pytest.mark.parametrize("even", [True, False])
+def test_the_air_in_a_window_does_not_count_against_its_tower(tower_scene, even):
+    """Scrub hides much of the body below the window: it stands free at few levels of all."""
+    bushes = tuple((x, y, 6.0) for x in (-4.0, 0.0, 4.0) for y in (-4.0, 0.0, 4.0))
+    scene = tower_scene("window", 25.0, bearing=0.0, circuits=2, trees=bushes)
+    if not even:
+        arm = (scene.xyz[:, 0] > scene.foot[0] + 6.5) & scene.tower
+        scene = type(scene)(scene.xyz[~arm], scene.codes[~arm], scene.foot)
+    shape = measured(scene, 25.0, (0.3, 0.2), amid=True)
+    assert (shape is not None) == even
+    if shape is not None:
+        assert shape.profile.free < ANY.free
+        assert np.hypot(shape.x - scene.foot[0], shape.y - scene.foot[1]) < 0.6

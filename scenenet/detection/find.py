@@ -133,13 +133,15 @@ class _Measurement:
         if sum(span.followed for span in seen) < needed / 2:
             return []
         near = self.points(axis + offset[:2], SURROUNDINGS_M) - offset
-        for amid in (False, True):
+        for amid in (False,) if rough.pole else (False, True):
             share = settings.crossarm * (WIDE if amid else 1)
             crossarm = min(max(settings.eps / 2, share * rough.height), WIDEST_HEAD_M)
             shape = measure_structure(
                 near, leaving, axis, rough.base, rough.height, crossarm, tests, amid
             )
             if shape is None or not shape.carries(needed):
+                continue
+            if rough.pole and shape.profile.width > POLE_M:
                 continue
             spans = self._leading_on(shape)
             if not replace(shape, spans=spans).carries(needed):

@@ -41,6 +41,7 @@ class RoughTower:
         height: m, from the base to its top.
         probability: highest probability of its voxels.
         place_x, place_y, reach: m, within which planar radius of which place its own voxels lie.
+        pole: whether it was looked for as a pole, so that a wider body there is not the one.
     """
 
     x: float
@@ -51,13 +52,14 @@ class RoughTower:
     place_x: float
     place_y: float
     reach: float
+    pole: bool
 
 
 class RoughTowers(Sequence[RoughTower]):
     """Rough towers, of which a long survey has too many to keep an object for each."""
 
     def __init__(self, rows: np.ndarray) -> None:
-        """``rows`` (N, 8) has the attributes of each, in their order."""
+        """``rows`` (N, 9) has the attributes of each, in their order."""
         self._rows = rows
 
     def __len__(self) -> int:
@@ -72,7 +74,9 @@ class RoughTowers(Sequence[RoughTower]):
     def __getitem__(self, at: int | slice) -> RoughTower | RoughTowers:
         if isinstance(at, slice):
             return RoughTowers(self._rows[at])
-        return RoughTower(*self._rows[at].tolist())
+        x, y, base, height, probability, place_x, place_y, reach, pole = self._rows[at].tolist()
+        own = place_x, place_y, reach, bool(pole)
+        return RoughTower(x, y, base, height, probability, *own)
 
 
 def rough_towers(
@@ -125,14 +129,15 @@ def _measure(
     seen = voxels.within(axis, crossarm)
     peak = float(voxels.probability[seen].max())
     middle, free = centre_body(around, axis, body, size)
-    centres = [middle] if free else []
+    centres = [(middle, False)] if free else []
     if not free or np.hypot(*(middle - axis)) > POLE_M:
-        pole = centre_pole(around, axis, body, size)
-        centres += [] if pole is None else [pole]
+        place = centre_pole(around, axis, body, size)
+        centres += [] if place is None else [(place, True)]
     found = []
-    for x, y in centres:
-        body = measure_body(around, np.array([x, y]), voxels.z[seen], foot_radius, size)
+    for centre, pole in centres:
+        body = measure_body(around, centre, voxels.z[seen], foot_radius, size)
         if body.height >= min_height and body.upright >= min_upright:
-            place = float(axis[0]), float(axis[1]), crossarm
-            found.append(RoughTower(float(x), float(y), body.base, body.height, peak, *place))
+            (x, y), (place_x, place_y) = centre.tolist(), axis.tolist()
+            own = place_x, place_y, crossarm, pole
+            found.append(RoughTower(x, y, body.base, body.height, peak, *own))
     return found

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenenet.detection.conductors import ConductorPoints
 from scenenet.detection.detected_voxels import DetectedVoxels
-from scenenet.detection.find import find_towers
+from scenenet.detection.find import _Measurement, find_towers
+from scenenet.detection.rough import RoughTower
 from scenenet.detection.settings import DetectionSettings
 from scenenet.detection.surroundings import surroundings_in
 
@@ -99,6 +101,24 @@ def test_the_middle_between_two_poles_does_not_hide_them(tower_scene, apart):
     assert len(places) == 2
     assert places[0] == pytest.approx(one.foot[:2], abs=0.3)
     assert places[1] == pytest.approx(other.foot[:2], abs=0.3)
+
+
+@pytest.mark.parametrize(("kind", "pole", "towers"), [
+    ("lattice", False, 1), ("lattice", True, 0), ("wooden", True, 1),
+])  # fmt: skip
+def test_what_was_looked_for_as_a_pole_is_no_wider(tower_scene, kind, pole, towers):
+    """Such as the edge of a high building, which is as slim as a pole to the voxels."""
+    scene = tower_scene(kind, 22.0)
+    points, settings = surroundings_in(scene.xyz), DetectionSettings()
+    occupied = surroundings_in(np.unique(np.floor(scene.xyz), axis=0) + 0.5)
+    conductors = ConductorPoints(points, 4.5)
+    measurement = _Measurement(
+        occupied, points, conductors, np.zeros(3), SIZE, TAU, settings, bent=True
+    )
+    x, y, base = scene.foot.tolist()
+    assert (
+        len(measurement.towers_near(RoughTower(x, y, base, 22.0, 0.9, x, y, 5.5, pole))) == towers
+    )
 
 
 def pair(tower_scene, apart, height, **changes):

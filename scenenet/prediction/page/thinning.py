@@ -32,34 +32,41 @@ def thinned(xyz: np.ndarray, most: int) -> np.ndarray:
     offsets = xyz - low
     # Points lie on surfaces: about as many cells as points of the result cover the widest one.
     cell = max(STEP_M, float(np.sqrt(np.prod(np.sort(high - low)[1:]) / most)) / 4)
-    kept = _one_each(offsets, cell)
+    kept = _one_each(offsets, cell, len(offsets))
     while len(kept) > most:
         # The size is found with the points that are left: they are few.
         few = offsets[kept]
         while len(few) > most:
             cell *= FINER
-            few = few[_one_each(few, cell)]
-        kept = _one_each(offsets, cell)
+            few = few[_one_each(few, cell, len(few))]
+        kept = _one_each(offsets, cell, 4 * most)
     return xyz[kept]
 
 
 @numba.njit(**EXACT)
-def _one_each(offsets, cell):  # pragma: no cover - compiled
-    """Rows of the first of the points (n, 3) m in each cell, ascending; no offset is negative."""
+def _one_each(offsets, cell, expected):  # pragma: no cover - compiled
+    """Rows of the first of the points (n, 3) m in each cell, ascending; no offset is negative.
+
+    ``expected`` cells are quickly found: their table is in the cache where they are few. There may
+    be more.
+    """
     rows, n = np.empty(len(offsets), np.int64), 0
     places = 1
-    while places < 2 * len(offsets):
+    while places < 2 * min(expected, len(offsets)):
         places *= 2
     seen = np.full(places, -1, np.int64)
     for i in range(len(offsets)):
         x, y, z = offsets[i]
         code = np.int64(np.floor(x / cell)) << 42
         code |= np.int64(np.floor(y / cell)) << 21 | np.int64(np.floor(z / cell))
-        mixed = code * np.int64(0x9E3779B97F4A7C1)
+        mixed = (code ^ (code >> 32)) * np.int64(0x9E3779B97F4A7C1)
+        mixed = (mixed ^ (mixed >> 32)) * np.int64(0x9E3779B97F4A7C1)
         at = (mixed ^ (mixed >> 29)) & (places - 1)
         while seen[at] >= 0 and seen[at] != code:
             at = (at + 1) & (places - 1)
         if seen[at] < 0:
+            if 2 * n > places:
+                return _one_each(offsets, cell, len(offsets))
             seen[at] = code
             rows[n] = i
             n += 1

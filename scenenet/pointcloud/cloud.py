@@ -30,6 +30,8 @@ class PointCloud:
             ``classification`` are then the labels, which may differ.
         fields: what else is known about the points, for measurements; None where it was not asked
             for.
+        withheld: (N,) bool, points that their producer marked as not to be used; None where that is
+            not known.
     """
 
     xyz: np.ndarray
@@ -38,6 +40,7 @@ class PointCloud:
     crs: pyproj.CRS | None = None
     truth: np.ndarray | None = None
     fields: PointFields | None = None
+    withheld: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         xyz, codes = np.asarray(self.xyz), np.asarray(self.classification)
@@ -127,4 +130,5 @@ class PointCloud:
         truth = None if self.truth is None else self.truth[index]
         fields = None if self.fields is None else self.fields.select(index)
         classes = self.classification[index]
-        return PointCloud(self.xyz[index], classes, self.scheme, self.crs, truth, fields)
+        withheld = None if self.withheld is None else self.withheld[index]
+        return PointCloud(self.xyz[index], classes, self.scheme, self.crs, truth, fields, withheld)

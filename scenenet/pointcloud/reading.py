@@ -214,6 +214,7 @@ def iter_chunks(
             scheme,
             crs,
             fields=PointFields.of_records(each, fields),
+            withheld=np.array(each["withheld"], bool),
         )
         for each in records
     )

@@ -11,7 +11,7 @@ from scenenet.clearance.section import Area, SectionPoints
 from scenenet.prediction.found_line import WireSearch
 from scenenet.prediction.work.lattice import groups
 from scenenet.prediction.work.structures import Owners, Structures
-from scenenet.prediction.work.tiling import TileSpool
+from scenenet.prediction.work.tiling import LOW_POINT, TileSpool
 
 KEPT_POINTS = 4_000_000
 """Points in memory besides those of a section: neighbouring sections need the same tiles."""
@@ -21,10 +21,6 @@ JUMPER_M = 3.0
 
 FREE, TOWER, WIRE, NOISE = 0, 1, 2, 3
 """What a point belongs to: nothing, the structure of a tower, a voxel of a wire, or noise."""
-
-LOW_POINT = 7
-"""Class of points that the producer marked as noise, in every version of LAS and every scheme that
-has it."""
 
 
 class WireVoxels:

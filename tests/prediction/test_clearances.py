@@ -115,7 +115,7 @@ def test_points_with_the_class_of_noise_are_no_obstacles_without_a_scheme(survey
     middle = wire.catenary.at_shares(np.array([0.5]))[0]
     flock = middle + np.random.default_rng(0).uniform(-0.4, 0.4, (30, 3)) - (0.0, 0.0, 1.5)
 
-    def dangers(code: int) -> int:
+    def dangers(code: int, withheld: int = 0) -> int:
         """Places too near of points with a class, which height alone would call vegetation."""
         cloud = PointCloud(
             np.concatenate([points.xyz, flock]),
@@ -125,6 +125,9 @@ def test_points_with_the_class_of_noise_are_no_obstacles_without_a_scheme(survey
         )
         path = tmp_path / f"{code}.laz"
         write_las(path, cloud)
+        written = laspy.read(path)
+        written.withheld[-len(flock) :] = withheld
+        written.write(path)
         read_file(path, path.name, tmp_path / f"{code}", VOXEL_M, 20_000, classes=True)
         work = WorkFile.open(tmp_path / f"{code}")
         spool = TileSpool(work.lattice, [work.blocks])
@@ -134,6 +137,7 @@ def test_points_with_the_class_of_noise_are_no_obstacles_without_a_scheme(survey
 
     assert dangers(1) == 1
     assert dangers(7) == 0
+    assert dangers(1, withheld=1) == 0
 
 
 def test_points_of_wires_that_were_not_traced_are_no_obstacles(survey, wires):

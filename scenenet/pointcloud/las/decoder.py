@@ -180,6 +180,7 @@ def open_points(
             lazrs.SELECTIVE_DECOMPRESS_XY_RETURNS_CHANNEL
             | lazrs.SELECTIVE_DECOMPRESS_Z
             | lazrs.SELECTIVE_DECOMPRESS_CLASSIFICATION
+            | lazrs.SELECTIVE_DECOMPRESS_FLAGS
         )
     with Path(job["path"]).open("rb") as stream:
         stream.seek(job["offset"])

@@ -90,7 +90,8 @@ def decompress(
     Args:
         header: its checked header.
         chunk_points: points in each array except the last.
-        places_only: only coordinates and class are needed, which is faster; other fields may be 0.
+        places_only: only coordinates, class and flags are needed, which is faster; other fields
+            may be 0.
         stall_seconds: time without data after which the process is stopped.
         command: command to run instead of the worker.
 

@@ -26,7 +26,8 @@ def iter_records(
     Args:
         header: its checked header.
         chunk_points: points in a chunk.
-        places_only: only coordinates and class are needed, which is faster; other fields may be 0.
+        places_only: only coordinates, class and flags are needed, which is faster; other fields
+            may be 0.
 
     Raises:
         InputError: the points cannot be decoded; the message has the reason.

@@ -34,6 +34,10 @@ _OFFSET = np.dtype("<f4")
 SPOOLED_KINDS = VOXELS, POINTS = ("voxels", "points")
 """Blocks of each tile: its occupied voxels, and its points."""
 
+LOW_POINT = 7
+"""Class of points that the producer marked as noise, in every version of LAS and every scheme that
+has it."""
+
 CLASSES = "classes"
 """Blocks with the class codes of the points, where a later stage asks for them."""
 

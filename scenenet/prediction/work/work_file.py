@@ -7,20 +7,22 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from scenenet.core.errors import InputError, OutputError, in_file
 from scenenet.core.files import atomic
 from scenenet.core.progress import track
 from scenenet.core.provenance import is_still
 from scenenet.core.unchanged import FileState, unchanged
 from scenenet.measurement.registry import measurement_named
-from scenenet.pointcloud import iter_chunks
+from scenenet.pointcloud import PointCloud, iter_chunks
 from scenenet.pointcloud.quality.screening import Screening
 from scenenet.pointcloud.reading import SurveyInfo, survey_of_lengths
 from scenenet.prediction.file_status import SurveyFile
 from scenenet.prediction.work.block_file import BlockFile, BlockWriter
 from scenenet.prediction.work.lattice import Lattice
 from scenenet.prediction.work.survey_system import SurveySystem, in_metres
-from scenenet.prediction.work.tiling import Layer, SpoolWriter, spooled_kinds
+from scenenet.prediction.work.tiling import LOW_POINT, Layer, SpoolWriter, spooled_kinds
 
 if TYPE_CHECKING:
     import pyproj
@@ -140,7 +142,8 @@ def read_file(
         crs: system of a file that states none; None if it is not known.
         planned: what another process expects of the file; None if nothing was expected.
         further: further layers of voxels, for models that observe other ones.
-        classes: whether the class codes of the points are kept.
+        classes: whether the class codes of the points are kept, and of those that are withheld the
+            class of noise.
 
     Raises:
         OutputError: the work file cannot be written.
@@ -199,9 +202,16 @@ def _read(
             steps = {}
             if chunk.fields is not None:
                 steps = {name: m.point_steps(chunk.fields) for name, m in measurements.items()}
-            codes = chunk.classification if classes else None
+            codes = _codes(chunk) if classes else None
             spool.add(in_metres(chunk.xyz, info.unit_sizes), steps, codes)
             n_points += len(chunk)
     screening.raise_if_not_metres()
     extent = (*screening.mins[:2].tolist(), *screening.maxs[:2].tolist()) if n_points else None
     return SurveyFile(path, path.name, state, n_points, extent, warnings=screening.warnings())
+
+
+def _codes(chunk: PointCloud) -> np.ndarray:
+    """(n,) uint8 class codes, with that of noise for points that are not to be used."""
+    if chunk.withheld is None:
+        return chunk.classification
+    return np.where(chunk.withheld, np.uint8(LOW_POINT), chunk.classification)

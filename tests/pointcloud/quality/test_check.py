@@ -47,7 +47,8 @@ def test_counts_density_and_extent(grid_survey):
     assert facts["epsg"] == 32629
     assert facts["unit"] == "metre"
     np.testing.assert_allclose(np.subtract(facts["maxs"], facts["mins"]), [39, 19, 0])
-    assert report.warnings == ()
+    (text,) = report.warnings
+    assert "10 points are labelled tower, and 0 conductor" in text
 
 
 def test_class_densities_are_percent_of_all_points_as_in_table_5_1(grid_survey):

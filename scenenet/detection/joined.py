@@ -102,13 +102,16 @@ def _across(one: Structure, other: Structure) -> float | None:
 def tower_of(bodies: Sequence[Structure]) -> Structure:
     """The tower that joined bodies belong to.
 
-    It is the body that is nearest to the middle of their conductors and crossarms. Two legs without
-    one between them are the two bodies of a portal, and so are two poles.
+    It is the body that was found amid the conductors, or else the one that is nearest to the middle
+    of conductors and crossarms: from a leg not all conductors are seen, and crowns look like
+    crossarms. Two legs without one between them are the two bodies of a portal, and so are two
+    poles.
     """
-    first = bodies[0]
     for body in bodies:
         if body.apart:
             return body
+    bodies = [body for body in bodies if body.amid] or bodies
+    first = bodies[0]
     right = across(first.along)
     at = [float(np.array([b.x - first.x, b.y - first.y]) @ right) for b in bodies]
     poles = max(body.profile.width for body in bodies) <= POLE_M

@@ -128,7 +128,7 @@ def measure_structure(
         return tuple(leaving(place[:2] + away, base, top, crossarm))
 
     whole = _with_head(_with_twin(body, points, spans, beside), points, spans, axis)
-    return whole if tests.passed(body) or _has_window(whole) else None
+    return replace(whole, amid=amid) if tests.passed(body) or _has_window(whole) else None
 
 
 def _has_window(tower: Structure) -> bool:

@@ -40,6 +40,7 @@ class Structure:
             above it.
         upright: share of the levels of the body that have a point.
         spans: directions in which conductors leave.
+        amid: whether it was looked for, and found, amid its conductors.
     """
 
     x: float
@@ -54,6 +55,7 @@ class Structure:
     spans: tuple[Span, ...]
     apart: float = 0.0
     body_top: float = np.inf
+    amid: bool = False
 
     @property
     def reach(self) -> float:

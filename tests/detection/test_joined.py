@@ -72,6 +72,16 @@ def test_the_tower_is_the_body_amid_the_conductors(window):
     assert tower.structure is axis
 
 
+def test_the_body_found_amid_the_conductors_is_the_tower_whatever_a_leg_shows(window):
+    """A crown beside the tower, taken for a crossarm, moves the middle of all to the leg."""
+    crown = Head(np.ones((26, 2), bool), -13.0, 17.0, 0.5)
+    leg = body(window, -3.0, left=-5.0, right=6.0, head=crown)
+    axis = body(window, 0.0, left=-8.0, right=8.0)
+    assert tower_of([leg, axis]) is leg
+    axis = replace(axis, amid=True)
+    assert tower_of([leg, axis]) is axis
+
+
 def test_two_legs_without_a_body_between_them_are_a_portal(window):
     legs = [body(window, -4.5, left=0.0, right=9.0), body(window, 4.7, left=-9.0, right=0.0)]
     shape = tower_of(legs)

@@ -33,10 +33,9 @@ the ground is not in the data, as in a tower that was cut out; its lowest points
 LEGS = 4
 """Cells with the feet of a tower, which are its lowest ones."""
 
-FEET_M, FEET = 12.0, 0.25
-"""m around the axis in which the legs of a tower that was cut out stand, and the largest share of
-this area with points at most ``SPREAD_M`` above its lowest ones near the axis. Legs and their
-braces are in few cells; where the ground is in the data beside the axis, it is in more."""
+FEET_M, AROUND_M = 12.0, 5.0
+"""m around the axis in which the legs of a tower stand, and m above its lowest points near the axis
+below which nothing is further away where a tower was cut out: conductors are higher."""
 
 BELOW_M, BELOW = 4.0, 0.1
 """m below the plane, and the largest share of the points so far below it. With more, the plane lies
@@ -109,28 +108,33 @@ def fit_ground(points: np.ndarray, axis: np.ndarray) -> Ground:
 
 
 def _further_down(points: np.ndarray, axis: np.ndarray, plane: np.ndarray) -> float:
-    """m that the legs of a tower reach below a plane through its lowest points near the axis.
+    """m that the legs of a tower that was cut out reach below a plane through its lowest points
+    near the axis.
 
     Args:
         points: (N, 3) m.
         axis: (2,) m.
         plane: slope east and north, and elevation at the axis, m.
     """
-    low = _lowest(_within(points, axis, FEET_M))
-    below = plane[2] - (low[:, 2] - low[:, :2] @ plane[:2])
-    feet = np.sort(below[below > -SPREAD_M])
-    if len(feet) < LEGS or len(feet) > FEET * np.pi * (FEET_M / CELL_M) ** 2:
+    offset = points - [*axis, 0.0]
+    below = plane[2] - (offset[:, 2] - offset[:, :2] @ plane[:2])
+    outside = np.hypot(offset[:, 0], offset[:, 1]) > FEET_M
+    if (below[outside] > -AROUND_M).any():
         return 0.0
+    if outside.all():
+        return 0.0
+    lowest = _lowest(offset[~outside])
+    depth = np.sort(plane[2] - (lowest[:, 2] - lowest[:, :2] @ plane[:2]))
     # A leg is in several cells; a single return from below is in one.
-    return max(float(feet[-LEGS]), 0.0)
+    return max(float(depth[-min(LEGS, len(depth))]), 0.0)
 
 
-def _within(points: np.ndarray, axis: np.ndarray, radius: float = RADIUS_M) -> np.ndarray:
-    """Planar offset from the axis (2,) m and elevation of the points (N, 3) m within ``radius`` m,
+def _within(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Planar offset from the axis (2,) m and elevation of the points (N, 3) m within ``RADIUS_M``,
     or of all if none is, (M, 3)."""
     east, north = points[:, 0] - axis[0], points[:, 1] - axis[1]
-    near = np.flatnonzero((np.abs(east) <= radius) & (np.abs(north) <= radius))
-    near = near[np.hypot(east[near], north[near]) <= radius]
+    near = np.flatnonzero((np.abs(east) <= RADIUS_M) & (np.abs(north) <= RADIUS_M))
+    near = near[np.hypot(east[near], north[near]) <= RADIUS_M]
     return (points.T[:, near].T if len(near) else points) - [*axis, 0.0]
 
 

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.workflow
 
 ONLY_ELSEWHERE = {
     "sample", "samples", "search", "metric", "evidence", "target", "first", "span_id",
-    "conductor_id", "measurement_source",
+    "conductor_id", "conductor", "span", "z", "measurement_source",
 }  # fmt: skip
 """Names of results that this run does not have: those of TS40K folders, of models in metres, of
 other targets, of lines and of measurements from outside the package."""

@@ -33,6 +33,10 @@ SLOPE_CELL_M, SLOPE_M, SLOPE_SEEN = 4.0, 3.0, 0.7
 be off a plane, and the smallest share of them that is not further off. A hillside curves by as much
 over a block; the lowest points at a house are on its roof and beside it."""
 
+SLOPE_CELLS = 32
+"""Cells that show the slope of the ground, at least: half of those in a block. A plane through a
+few cells at the edge of a survey is as steep as the crowns in them are high."""
+
 
 class Block(NamedTuple):
     """What is known of a block.
@@ -113,6 +117,8 @@ def _slope(points: np.ndarray) -> float:
     cells = np.floor(points[:, :2] / SLOPE_CELL_M).astype(np.int64)
     order = np.lexsort((points[:, 2], cells[:, 1], cells[:, 0]))
     first = np.append(True, (np.diff(cells[order], axis=0) != 0).any(axis=1))
+    if first.sum() < SLOPE_CELLS:
+        return 0.0
     low = points[order[first]] - points.mean(axis=0)
     design = np.column_stack([low[:, :2], np.ones(len(low))])
     plane = np.linalg.lstsq(design, low[:, 2], rcond=None)[0]

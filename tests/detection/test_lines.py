@@ -6,6 +6,8 @@ import numba
 import numpy as np
 import pytest
 
+from scenenet.detection.conductor_blocks import ConductorBlocks
+from scenenet.detection.conductor_rules import RISE
 from scenenet.detection.conductors import ConductorPoints
 from scenenet.detection.lines import points_on_lines
 from scenenet.detection.surroundings import surroundings_in
@@ -65,6 +67,13 @@ def test_a_house_is_not_steep_ground():
     line = [conductor(t, 17, bearing=270, rise=0.8) for t in (-1, 1)]
     around = surroundings_in(np.concatenate([roof, *line]))
     assert ConductorPoints(around, 4.5).leaving(AXIS, 0.0, HEIGHT, 5.0, around) == []
+
+
+def test_a_few_points_of_a_crown_at_the_edge_of_a_survey_are_not_steep_ground():
+    crown_there = np.random.default_rng(3).uniform((130, 205, 0), (136, 211, 0), (200, 3))
+    crown_there[:, 2] = 4 * (crown_there[:, 0] - 130)
+    blocks = ConductorBlocks(surroundings_in(crown_there), 4.5)
+    assert blocks.near(np.array([131.0, 208.0]), 2.0).rise == RISE
 
 
 @pytest.mark.parametrize("spacing", [0.05, 0.3, 1.2, 2.0])

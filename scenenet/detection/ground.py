@@ -103,30 +103,26 @@ def fit_ground(points: np.ndarray, axis: np.ndarray) -> Ground:
     seen = (np.abs(z - design @ plane) < SEEN_M).mean()
     if seen < SEEN or (above < -BELOW_M).mean() > BELOW:
         plane[2] += np.percentile(above, 1)
-        plane[2] -= _further_down(points, axis, np.array([plane[0], plane[1], middle + plane[2]]))
+        foot = Ground(middle + float(plane[2]), plane[:2])
+        plane[2] -= _further_down(points, axis, foot)
     return Ground(middle + float(plane[2]), plane[:2])
 
 
-def _further_down(points: np.ndarray, axis: np.ndarray, plane: np.ndarray) -> float:
-    """m that the legs of a tower that was cut out reach below a plane through its lowest points
-    near the axis.
+def _further_down(points: np.ndarray, axis: np.ndarray, foot: Ground) -> float:
+    """m that the legs of a tower that was cut out reach below ``foot``, the plane through its
+    lowest points near the axis; 0 where the tower was not cut out.
 
     Args:
         points: (N, 3) m.
         axis: (2,) m.
-        plane: slope east and north, and elevation at the axis, m.
     """
     offset = points - [*axis, 0.0]
-    below = plane[2] - (offset[:, 2] - offset[:, :2] @ plane[:2])
     outside = np.hypot(offset[:, 0], offset[:, 1]) > FEET_M
-    if (below[outside] > -AROUND_M).any():
+    if outside.all() or (foot.height(*offset[outside].T) < AROUND_M).any():
         return 0.0
-    if outside.all():
-        return 0.0
-    lowest = _lowest(offset[~outside])
-    depth = np.sort(plane[2] - (lowest[:, 2] - lowest[:, :2] @ plane[:2]))
+    heights = np.sort(foot.height(*_lowest(offset[~outside]).T))
     # A leg is in several cells; a single return from below is in one.
-    return max(float(depth[-min(LEGS, len(depth))]), 0.0)
+    return max(-float(heights[min(LEGS, len(heights)) - 1]), 0.0)
 
 
 def _within(points: np.ndarray, axis: np.ndarray) -> np.ndarray:
